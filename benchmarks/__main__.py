@@ -19,7 +19,16 @@ from typing import Any
 from benchmarks import drives, processes
 from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
-from benchmarks.replaying import Held, Whole, floor, hold, library_codecs, lines_of, loop, whole
+from benchmarks.replaying import (
+    Held,
+    NoRecorder,
+    hold,
+    library_codecs,
+    lines_of,
+    measure_floor,
+    measure_loop,
+    measure_replay,
+)
 from benchmarks.timing import Spread, ratios, table, timed
 from roadeval.config.run import configure
 from roadeval.data import Frame, Role
@@ -34,73 +43,80 @@ from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
 TURNS = 3
-"""Of loop and floors, for each `--repeat`: they take seconds, and a machine slows down for as long.
-"""
+"""Turns of loop and floors for each `--repeat`: a turn takes seconds, and so does a slow-down."""
 PARTS = ("replay", "stages", "plain", "process")
 
 
 def main() -> None:
-    """Measure what was asked for, print the tables and write the JSON."""
-    options = _arguments()
+    """Measure the chosen parts, print the tables and write the JSON."""
+    options = parse_arguments()
     source = Source(options.drive, tuple(options.road_label), tuple(options.ignore_label))
     frames = source.frames(options.frames)
-    found: dict[str, Any] = {"machine": _machine(), "drive": options.drive.name, "sizes": {}}
+    results: dict[str, Any] = {
+        "machine": describe_machine(),
+        "drive": options.drive.name,
+        "sizes": {},
+    }
     with tempfile.TemporaryDirectory() as folder:
         for size in options.sizes:
             name = "{}x{}".format(*size)
-            measured = _at_size(frames, size, Path(folder), options)
-            found["sizes"][name] = measured
+            measured = measure_size(frames, size, Path(folder), options)
+            results["sizes"][name] = measured
             for part, rows in measured.items():
                 print(table(f"{options.drive.stem} {name}: {part}", rows), flush=True)
     if options.output:
-        options.output.write_text(json.dumps(found, indent=2, default=_json) + "\n")
+        options.output.write_text(json.dumps(results, indent=2, default=to_json) + "\n")
 
 
-def _at_size(
+def measure_size(
     frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
 ) -> dict[str, Rows]:
     drive = drives.write(folder / "drive.mcap", frames, size)
     run = configure({"run": {"jobs": 1}})
-    found: dict[str, Rows] = {}
+    tables: dict[str, Rows] = {}
     if "replay" in options.parts:
         held = hold(drive, run)
-        found["end to end and the codec floor"] = [
-            row for jobs in options.jobs for row in _replay(drive, held, folder, jobs, options)
+        tables["end to end and the codec floor"] = [
+            measure_against_floor(drive, held, folder, jobs, options) for jobs in options.jobs
         ]
     if {"stages", "plain"} & set(options.parts):
-        mine = _stages(drive, folder)
-        found["each stage alone, ms a frame"] = [
+        mine = measure_stages(drive, folder)
+        tables["each stage alone, ms a frame"] = [
             {"stage": name, "ms": Spread.of([1e3 * t for t in times])}
             for name, times in mine.items()
         ]
         if "plain" in options.parts:
-            found["against the plain way, ms a frame"] = _plain(drive, mine, folder, options)
+            tables["against the plain way, ms a frame"] = measure_plain(
+                drive, mine, folder, options
+            )
     if "process" in options.parts:
-        found["processes"] = _process(frames, size, folder, options)
-        found["commands"] = _commands(frames, size, folder)
-    return found
+        tables["processes"] = measure_processes(frames, size, folder, options)
+        tables["commands"] = measure_commands(frames, size, folder)
+    return tables
 
 
-def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace) -> Rows:
-    """Measure loop and floor in turns, so that a busy machine slows both of them, then whole."""
+def measure_against_floor(
+    drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace
+) -> dict[str, Any]:
+    """Measure loop and floor in turns, so that a busy machine slows both; then the whole replay."""
     run, count = configure({"run": {"jobs": jobs}}), len(held.files)
-    for work in (loop, whole):
+    for work in (measure_loop, measure_replay):
         work(drive, run, folder)  # warms the caches
     turns = [
         (
-            loop(drive, run, folder),
-            floor(held, folder, jobs, library_codecs()),
-            floor(held, folder, jobs, nullcontext()),
+            measure_loop(drive, run, folder),
+            measure_floor(held, folder, jobs, library_codecs()),
+            measure_floor(held, folder, jobs, nullcontext()),
         )
         for _ in range(TURNS * options.repeat)
     ]
-    loops, floors, own_floors = ([each.wall for each in way] for way in zip(*turns, strict=True))
-    loops_cpu, floors_cpu, _ = ([each.cpu for each in way] for way in zip(*turns, strict=True))
-    wholes = [whole(drive, run, folder).wall for _ in range(options.repeat)]
+    loops, floors, own_floors = ([cost.wall for cost in way] for way in zip(*turns, strict=True))
+    loops_cpu, floors_cpu, _ = ([cost.cpu for cost in way] for way in zip(*turns, strict=True))
+    wholes = [measure_replay(drive, run, folder).wall for _ in range(options.repeat)]
     loop_s, floor_s = Spread.of(loops).median, Spread.of(floors).median
     once = Spread.of([seconds - loop_s for seconds in wholes])
     spare = 1.5 * floor_s - loop_s
-    row = {
+    return {
         "jobs": jobs,
         "frames": count,
         "floor ms/frame": Spread.of([1e3 * seconds / count for seconds in floors]),
@@ -115,11 +131,10 @@ def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.
         else "never",
         "layers kB/frame": round(held.layer_bytes / 1e3),
     }
-    return [row]
 
 
-def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
-    """Seconds of each part of every frame, one after the other in one thread."""
+def measure_stages(drive: Path, folder: Path) -> dict[str, list[float]]:
+    """Return the seconds of each part of every frame, one after the other in one thread."""
     times: dict[str, list[float]] = {}
 
     def lap(name: str, seconds: float) -> None:
@@ -148,18 +163,18 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
     return times
 
 
-def _plain(
+def measure_plain(
     drive: Path, mine: dict[str, list[float]], folder: Path, options: argparse.Namespace
 ) -> Rows:
     config = configure({"run": {"jobs": 1}})
     with open_log(drive) as log:
         run = prepare(log, config, ignore)
-        frames = [each.decode() for each in log.frames(run.selection)]
+        frames = [logged.decode() for logged in log.frames(run.selection)]
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
         results = [
             done.encoded
-            for i, (_, done) in enumerate(process([run], Whole(), ignore))
+            for i, (_, done) in enumerate(process([run], NoRecorder(), ignore))
             if i in chosen
         ]
     plain = PlainWay(frames, config)
@@ -172,15 +187,15 @@ def _plain(
     mean_write = sum(mine["write"]) / len(mine["write"])  # it writes every eighth frame
     ours["all record"] = ours["encode"] + mean_write
     theirs = {name: Spread.of(times).median for name, times in plain.times.items()}
-    rows = [_against(name, theirs[name], ours[name]) for name in theirs]
+    rows = [compare_row(name, theirs[name], ours[name]) for name in theirs]
     for title, left_out in (("sum", ""), ("sum without svm", "svm")):
         names = [name for name in theirs if not left_out or not name.endswith(left_out)]
-        sums = [sum(each[name] for name in names) for each in (theirs, ours)]
-        rows.append(_against(title, *sums))
+        sums = [sum(seconds[name] for name in names) for seconds in (theirs, ours)]
+        rows.append(compare_row(title, *sums))
     return rows
 
 
-def _against(name: str, theirs: float, ours: float) -> dict[str, Any]:
+def compare_row(name: str, theirs: float, ours: float) -> dict[str, Any]:
     return {
         "stage": name,
         "plain": f"{1e3 * theirs:.4g}",
@@ -189,7 +204,7 @@ def _against(name: str, theirs: float, ours: float) -> dict[str, Any]:
     }
 
 
-def _process(
+def measure_processes(
     frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
 ) -> Rows:
     short = drives.write(folder / "short.mcap", frames, size, options.memory_frames)
@@ -206,20 +221,20 @@ def _process(
     return rows
 
 
-def _commands(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
+def measure_commands(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
     short = drives.write(folder / "eleven.mcap", frames, size, 11)
     drive = drives.write(folder / "whole.mcap", frames, size)
     return [
         {
             "command": name,
-            "wall, s": Spread.of([each.wall for each in costs]),
-            "CPU, s": Spread.of([each.cpu for each in costs]),
+            "wall, s": Spread.of([cost.wall for cost in costs]),
+            "CPU, s": Spread.of([cost.cpu for cost in costs]),
         }
         for name, costs in processes.costs(short, drive, folder).items()
     ]
 
 
-def _machine() -> dict[str, Any]:
+def describe_machine() -> dict[str, Any]:
     return {
         "platform": platform.platform(),
         "python": platform.python_version(),
@@ -228,22 +243,22 @@ def _machine() -> dict[str, Any]:
     }
 
 
-def _json(value: Any) -> Any:
+def to_json(value: Any) -> Any:
     return asdict(value) if isinstance(value, Spread) else str(value)
 
 
-def _size(text: str) -> tuple[int, int]:
+def parse_size(text: str) -> tuple[int, int]:
     width, height = text.split("x")
     return int(width), int(height)
 
 
-def _arguments() -> argparse.Namespace:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--drive", type=Path, default=Path("recordings/demo.mcap"))
     parser.add_argument("--road-label", type=int, action="append", default=[])
     parser.add_argument("--ignore-label", type=int, action="append", default=[])
     parser.add_argument(
-        "--sizes", type=_size, nargs="+", default=[(640, 480), (1280, 720), (1920, 1080)]
+        "--sizes", type=parse_size, nargs="+", default=[(640, 480), (1280, 720), (1920, 1080)]
     )
     parser.add_argument("--jobs", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--repeat", type=int, default=3, help="rounds after the warming one")

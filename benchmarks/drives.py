@@ -1,4 +1,4 @@
-"""The drives that are measured: a log's own frames, brought to a size.
+"""The measured drives: frames of a log, resized.
 
 Sizes are made by resizing, so that every size shows the same scenes.
 """
@@ -42,7 +42,7 @@ class Source:
         config = configure({"labels": {"road": self.road, "ignore": self.ignore}})
         with open_log(self.path, config) as log:
             readable = (frame for frame in log.frames(log.select()) if frame.labelled)
-            return [each.decode() for each in islice(readable, count)]
+            return [frame.decode() for frame in islice(readable, count)]
 
 
 def resized(frame: Frame, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:

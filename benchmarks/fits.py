@@ -1,12 +1,12 @@
-"""How often truth and masks that do not fit the images are named, and how often others are.
+"""How often truth and masks that do not fit the images are named, and how often fitting ones.
 
 ``python -m benchmarks.fits DRIVE.mcap ... [--road V] [--ignore V]`` replays each drive with the
 presets paper, gated and robust, adds a small network that learns from its first frames, and holds
-their masks against truth and images: as they are, late by 1 to 5 frames, early, mirrored, upside
-down, inverted, and moved by 3 to 12 pixels. It prints a line of a table for each drive. Named is
-what is named by its kind, side, frames and pixels, these within two; of a lag of 3 frames and more
-it is enough that it is late or early. Pixels are judged by what is planted, whatever a method's own
-offset from the truth. CPU is that of one run with masks from elsewhere.
+their masks against truth and images: unchanged, late by 1 to 5 frames, early, mirrored, upside
+down, inverted, and moved by 3 to 12 pixels. It prints a line of a table for each drive. A misfit
+counts as named with its kind, side, frames and pixels, the last two within two; a lag of 3 frames
+and more only has to be named as late or early. Pixels are judged by the planted offset, without a
+method's own offset from the truth. CPU is that of one run with masks from elsewhere.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def network(frames: Sequence[Frame]) -> Masks:
 
 
 def wrong(masks: Masks, *, moves: bool) -> Iterator[tuple[Finding, Masks]]:
-    """Yield masks that do not fit, each with what is to be found."""
+    """Yield masks that do not fit, each with the expected finding."""
     places = np.arange(len(masks))
     for frames in LAGS:
         late = masks[np.clip(places - frames, 0, len(masks) - 1)]
@@ -88,7 +88,7 @@ def wrong(masks: Masks, *, moves: bool) -> Iterator[tuple[Finding, Masks]]:
 
 
 def named(frames: Sequence[FrameResult], truth: Masks, masks: Masks | None) -> list[Finding]:
-    """Return what does not fit of frames with a truth, and with masks from elsewhere."""
+    """Return the misfits of frames with a truth, and with masks from elsewhere."""
     check = FitCheck(range(len(frames)))
     for place, result in enumerate(frames):
         external = {} if masks is None else {"masks": np.ascontiguousarray(masks[place])}
@@ -102,7 +102,7 @@ def named(frames: Sequence[FrameResult], truth: Masks, masks: Masks | None) -> l
 
 
 def is_it(findings: Sequence[Finding], planted: Finding, subject: str) -> bool:
-    """Return whether what was planted is named, and nothing else."""
+    """Return whether the planted misfit is named, and nothing else."""
     if len(findings) != 1:
         return False
     (finding,) = findings
@@ -114,7 +114,7 @@ def is_it(findings: Sequence[Finding], planted: Finding, subject: str) -> bool:
 
 
 def main() -> None:
-    """Print a table with a line for each drive, and below it what is not named as it is."""
+    """Print a table with a line for each drive, and below it the wrong findings."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("drives", nargs="+", type=Path)
     parser.add_argument("--road", type=int)

@@ -1,4 +1,4 @@
-"""Many drives: one process against several, and what thousands of hours of video would take.
+"""Many drives: one process against several, and the time for thousands of hours of video.
 
     python -m benchmarks.fleet
 
@@ -28,24 +28,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("--drives", type=int, default=40)
     parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with TemporaryDirectory(prefix="roadeval-fleet-") as scratch:
         folder = Path(scratch)
         model = folder / "demo.model"
         roadeval.train([DEMO], model)
         logs = folder / "logs"
         logs.mkdir()
-        for number in range(asked.drives):
+        for number in range(options.drives):
             shutil.copy(DEMO, logs / f"drive_{number}.mcap")
         frame_s, frames = _frame_seconds(logs / "drive_0.mcap", model, folder)
-        walls = {n: _wall(logs, model, folder / f"fleet_{n}", n) for n in (1, asked.workers)}
-        again = _wall(logs, model, folder / f"fleet_{asked.workers}", asked.workers)
-        _show(walls, again, frame_s, frames * asked.drives)
-        _extrapolate(folder / f"fleet_{asked.workers}", walls, frame_s)
+        walls = {n: _wall(logs, model, folder / f"fleet_{n}", n) for n in (1, options.workers)}
+        again = _wall(logs, model, folder / f"fleet_{options.workers}", options.workers)
+        _show(walls, again, frame_s, frames * options.drives)
+        _extrapolate(folder / f"fleet_{options.workers}", walls, frame_s)
 
 
 def _frame_seconds(drive: Path, model: Path, folder: Path) -> tuple[float, int]:
-    """Return what a frame takes in one thread, in the middle of three drives, and their number."""
+    """Return the seconds of a frame in one thread, the median of three drives, and their frames."""
     config = roadeval.configure(
         {
             "training": {"model": str(model)},
@@ -75,23 +75,23 @@ def _wall(logs: Path, model: Path, folder: Path, workers: int) -> float:
 
 def _show(walls: dict[int, float], again: float, frame_s: float, frames: int) -> None:
     (one, alone), (many, together) = walls.items()
-    own = frames * frame_s
-    print(f"a frame alone, in one thread: {1000 * frame_s:.1f} ms; {frames} of them: {own:.1f} s")
-    print(f"{one} worker: {alone:.1f} s, {alone / own:.2f} times the frames' own time")
+    bare = frames * frame_s
+    print(f"a frame alone, in one thread: {1000 * frame_s:.1f} ms; {frames} of them: {bare:.1f} s")
+    print(f"{one} worker: {alone:.1f} s, {alone / bare:.2f} times the frames' own time")
     print(f"{many} workers: {together:.1f} s, {together / alone:.2f} times one worker's, ")
-    print(f"    {many * together / own:.2f} times the frames' own time in all processes")
+    print(f"    {many * together / bare:.2f} times the frames' own time in all processes")
     print(f"the same command again: {again:.1f} s")
 
 
 def _extrapolate(folder: Path, walls: dict[int, float], frame_s: float) -> None:
-    """Print what `HOURS` of video would take, in drives of `DRIVE_HOURS`."""
+    """Print the time and space for `HOURS` of video, in drives of `DRIVE_HOURS`."""
     fleet = roadeval.Result(folder)
     drives, frames = len(fleet.drives), int(fleet.drives["read"].sum())
     per_drive = (walls[1] - frames * frame_s) / drives
     count = HOURS // DRIVE_HOURS
     total = HOURS * 3600 * RATE_HZ
-    size = sum(Path(each).stat().st_size for each in fleet.drives["source"]) / frames
-    kept = {
+    size = sum(Path(source).stat().st_size for source in fleet.drives["source"]) / frames
+    sizes = {
         "frames/": sum(f.stat().st_size for f in folder.glob("frames/*/*")) / frames,
         "results/": sum(f.stat().st_size for f in folder.glob("results/*/*")) / frames,
     }
@@ -99,8 +99,8 @@ def _extrapolate(folder: Path, walls: dict[int, float], frame_s: float) -> None:
     print(f"{HOURS} hours at {RATE_HZ} Hz, in {count} drives: {total:,} frames")
     print(f"    {hours:.0f} core hours, of them {count * per_drive / 3600:.1f} beside the frames")
     print(f"    logs: {total * size / 1e12:.1f} TB, read at {size / frame_s / 1e6:.1f} MB/s a core")
-    for name, each in kept.items():
-        print(f"    {name:<9} {each:.0f} bytes a frame, {total * each / 1e9:.0f} GB")
+    for name, bytes_ in sizes.items():
+        print(f"    {name:<9} {bytes_:.0f} bytes a frame, {total * bytes_ / 1e9:.0f} GB")
 
 
 if __name__ == "__main__":

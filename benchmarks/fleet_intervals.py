@@ -1,6 +1,6 @@
 """How often a fleet's intervals hold, and what they find: ``python -m benchmarks.fleet_intervals``.
 
-Fleets are made up, so that the truth is known, and given to the function that `roadeval` uses.
+Fleets are made up, so that their truth is known, and passed to the function that `roadeval` uses.
 ``--write`` puts the table into INTERVALS.md.
 """
 
@@ -28,9 +28,9 @@ CONFIDENCE: Final = 0.95
 TAIL: Final = (1 - CONFIDENCE) / 2
 GROUPS: Final = (6, 10, 30, 200)
 POWER: Final = (0.5, 1)
-"""True means that are to be found, in standard deviations of a drive's effect."""
+"""True means to find, in standard deviations of a drive's effect."""
 SCALE: Final = 0.02
-"""That standard deviation, as a rate."""
+"""Standard deviation of an effect, as a rate."""
 
 
 # --- Made-up fleets -------------------------------------------------------------------------------
@@ -44,11 +44,10 @@ EFFECTS: Final[dict[str, Draw]] = {
 
 @dataclass(frozen=True)
 class Layout:
-    """What drives are like, their effects aside.
+    """Properties of drives, without their effects.
 
     ``least`` and ``most`` are the drives' own standard errors, in standard deviations of an effect.
-    Groups have 1 to ``drives`` drives, which share half of the variance where that is more than
-    one.
+    Groups have 1 to ``drives`` drives, which share half of the variance if there are several.
     """
 
     name: str
@@ -85,15 +84,15 @@ def _effects(
 # --- The table ------------------------------------------------------------------------------------
 
 
-def judged(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[float]:
-    """Make a fleet: whether Student's interval and ours hold, what ours finds, and its width."""
+def judge(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[float]:
+    """Make a fleet: whether Student's interval and ours hold, ours is sure, and ours' width."""
     effects = fleet(rng, draw, layout, groups)
     means, ours = group_means(effects) / SCALE, over_drives(effects, CONFIDENCE)
     half = special.stdtrit(groups - 1, 1 - TAIL) * means.std(ddof=1) / math.sqrt(groups)
     low, high = ours.low / SCALE, ours.high / SCALE
-    # An effect that is there moves the fleet; here 0 moves instead.
-    found = [100.0 * (not low <= -effect <= high) for effect in POWER]
-    return [100.0 * (abs(means.mean()) <= half), 100.0 * (low <= 0 <= high), *found, high - low]
+    # A true effect moves the fleet; here 0 moves instead.
+    sure = [100.0 * (not low <= -effect <= high) for effect in POWER]
+    return [100.0 * (abs(means.mean()) <= half), 100.0 * (low <= 0 <= high), *sure, high - low]
 
 
 def rows(repetitions: int) -> Iterator[str]:
@@ -105,7 +104,7 @@ def rows(repetitions: int) -> Iterator[str]:
         for place, layout in enumerate(LAYOUTS):
             for groups in GROUPS:
                 rng = np.random.default_rng([kind, place, groups])
-                results = [judged(rng, draw, layout, groups) for _ in range(repetitions)]
+                results = [judge(rng, draw, layout, groups) for _ in range(repetitions)]
                 *shares, widths = np.array(results).T
                 cells = "".join(f" {share.mean():.0f} |" for share in shares)
                 yield f"| {name} | {layout.name} | {groups} |{cells} {np.median(widths):.2f} |"

@@ -1,7 +1,7 @@
 """How often a drive's intervals hold, and what they find: ``python -m benchmarks.intervals``.
 
-Drives are made up, so that the truth is known, and given to the function that `roadeval` uses and
-to those of textbooks. ``--write`` puts the table into INTERVALS.md. Below it is a null run: five
+Drives are made up, so that their truth is known, and passed to the function of `roadeval` and to
+those of textbooks. ``--write`` puts the table into INTERVALS.md. Below it is a null run: five
 variants that are as good as the base, and how many drives have a false finding among them.
 """
 
@@ -27,7 +27,7 @@ Process = Callable[[np.random.Generator, int, int], Drives]
 
 CONFIDENCE: Final = 0.95
 EFFECTS: Final = (1, 2)
-"""True differences that are to be found, in standard deviations of a frame's difference."""
+"""True differences to find, in standard deviations of a frame's difference."""
 FAMILY: Final = 20
 """Comparisons that are corrected together where the least p-value is to be below 0.05 / 20."""
 WARM_UP: Final = 1000
@@ -187,9 +187,9 @@ def _ours(drives: Drives) -> str:
     means = [mean_distribution(series) for series in drives]
     width = np.median([np.ptp(mean.interval(CONFIDENCE)) for mean in means])
     p = np.array([[mean.p_value(-effect) for effect in (0, *EFFECTS)] for mean in means])
-    held, *found = 100 * (p >= 1 - CONFIDENCE).mean(axis=0)
+    held, *sure = 100 * (p >= 1 - CONFIDENCE).mean(axis=0)
     false, family, _ = 100 * (p < (1 - CONFIDENCE) / FAMILY).mean(axis=0)
-    finds = "/".join(f"{100 - share:.0f}" for share in found)
+    finds = "/".join(f"{100 - share:.0f}" for share in sure)
     return f" {held:.0f} | {width:.2f} | {finds} | {false:.1f} | {family:.0f} |"
 
 

@@ -1,10 +1,10 @@
-"""What is read of a long log, and what a run of it costs: bytes, time, memory, the recording.
+"""Costs of a run on a long log: bytes read, time, memory, the recording.
 
 python -m benchmarks.long_logs [--gigabytes 1] [--files 1] [--folder FOLDER] [--parts info ...]
 
 It writes a log as a robot's recorder does, by the `mcap` libraries, and runs commands on it. Bytes
-are those that a process asks of the system (``rchar`` in ``/proc/self/io``), less what ``--help``
-reads of the program itself; on Linux alone.
+are those that a process reads from the system (``rchar`` in ``/proc/self/io``), less those of
+``--help``, which reads the program itself; only on Linux.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _of(name: str, text: str) -> str:
 
 
 BYTES: Final = "robot_msgs/msg/Bytes"
-"""The type of what roadeval does not look into: of a lidar, of an IMU."""
+"""Types of messages that roadeval does not read: of a lidar, of an IMU."""
 MESSAGES: Final = {
     "sensor_msgs/msg/CompressedImage": COMPRESSED,
     BYTES: f"std_msgs/Header header\nuint8[] data\n{NESTED}",
@@ -115,7 +115,7 @@ class Recorder:
         self._file.close()
 
     def close(self) -> None:
-        """End the last file, and write what a folder of them begins with."""
+        """End the last file, and write the metadata of a folder of files."""
         self._end()
         paths = "".join(f"    - {name}\n" for name in self._names)
         (self._folder / "metadata.yaml").write_text(
@@ -125,7 +125,7 @@ class Recorder:
 
 
 def write(folder: Path, source: Source, gigabytes: float, files: int = 1) -> Path:
-    """Write a log of about so many bytes; a folder of split files where there are several."""
+    """Write a log of about so many bytes; several files make a folder."""
     pictures = [_noisy(*resized(frame, *SIZE)) for frame in source.frames(40)]
     cloud = np.random.default_rng(0).integers(0, 256, CLOUD, np.uint8).tobytes()
     folder.mkdir(parents=True)
@@ -203,13 +203,13 @@ def _info(header: dict[str, Any]) -> dict[str, Any]:
 
 
 # The numbers of a process as it ends. The peak of memory in /proc begins anew with a new program,
-# unlike what the system counts for a finished child.
+# unlike the system's count for a finished child.
 _END: Final = """
 import atexit, os, sys
 from pathlib import Path
 
 def end():
-    lines = [each.split() for name in ("io", "status") for each in Path("/proc/self", name).open()]
+    lines = [line.split() for name in ("io", "status") for line in Path("/proc/self", name).open()]
     numbers = {words[0]: words[1] for words in lines if len(words) > 1}
     used = os.times()
     Path(os.environ["COST"]).write_text(f"{numbers['rchar:']} {sum(used[:2])} {numbers['VmHWM:']}")
@@ -224,7 +224,7 @@ from mcap_ros2.decoder import DecoderFactory
 topics = ["/cameras/front/image/compressed", "/labels/front/semantic"]
 for path in sys.argv[2:]:
     with open(path, "rb") as file:
-        for place, found in enumerate(
+        for place, _ in enumerate(
             make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics)
         ):
             if place + 1 == int(sys.argv[1]):
@@ -238,8 +238,8 @@ for path in sys.argv[1:]:
 """
 
 
-def measured(code: str, *words: object) -> dict[str, Any]:
-    """Run a program; return what it has read, in bytes, and what it took."""
+def measure(code: str, *words: object) -> dict[str, Any]:
+    """Run a program; return the bytes that it has read, and its time and memory."""
     first, last, start = "", "", perf_counter()
     with (
         tempfile.NamedTemporaryFile("r") as cost,
@@ -290,20 +290,21 @@ def costs(drive: Path, folder: Path, parts: list[str]) -> Iterator[dict[str, Any
         "pdf": (_ROADEVAL, "report", out, "-o", folder / "report.pdf"),
         "page": (_ROADEVAL, "report", out, "-o", folder / "report.html"),
     }
-    size, own = sum(file.stat().st_size for file in files), measured(_ROADEVAL, "--help")["read"]
+    size = sum(file.stat().st_size for file in files)
+    start_up = measure(_ROADEVAL, "--help")["read"]
     if "fifty" in parts:
         train = "train", drive, "--image-topic", "/cameras/front/image/compressed"
-        measured(_ROADEVAL, *train, "--train-frames", 3, "-o", folder / "front.model")
+        measure(_ROADEVAL, *train, "--train-frames", 3, "-o", folder / "front.model")
     for name in parts:
-        found = measured(*every[name])
-        read = max(found.pop("read") - own, 0)
+        costs = measure(*every[name])
+        read = max(costs.pop("read") - start_up, 0)
         saved = folder / "rig.rrd" if name == "rig" else out
         made = saved.stat().st_size if "replay" in every[name] else 0
         yield {
             "what": name,
             "read, MB": f"{read / 1e6:.0f}",
             "of the log": f"{read / size:.3f}",
-            **found,
+            **costs,
             "recording, MB": f"{made / 1e6:.0f}" if made else "",
         }
 
@@ -319,7 +320,9 @@ def main() -> None:
     parser.add_argument("--drive", type=Path, default=Path("recordings/demo.mcap"))
     parser.add_argument("--gigabytes", type=float, default=1.0)
     parser.add_argument("--files", type=int, default=1, help="of the log")
-    parser.add_argument("--folder", type=Path, help="for the log; it is kept, and used again")
+    parser.add_argument(
+        "--folder", type=Path, help="folder of the log, which stays and is used again"
+    )
     parser.add_argument("--parts", choices=PARTS, nargs="+", default=PARTS)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:

@@ -1,7 +1,7 @@
-"""What picked labels are worth: ``python -m benchmarks.picking --drives FOLDER --idd FOLDER``.
+"""The worth of picked labels: ``python -m benchmarks.picking --drives FOLDER --idd FOLDER``.
 
 The truth of drives is held back, frames are picked as `roadeval pick` does, and the number for the
-whole drive is held against the true one, 200 times with another draw. The table is that of
+whole drive is compared with the true one, 200 times with another draw. The table is that of
 ``docs/how-to/pick.md``. ``--drives`` holds the two drives of CamVid, ``--idd`` is ``idd20k_lite``,
 of whose train part half of the drives teach, and the frames of the others are taken as one drive;
 synthetic drives are rendered.
@@ -24,7 +24,7 @@ import roadeval
 from benchmarks.tables import idd
 from benchmarks.world import RenderSettings, write_drive
 from roadeval.data import IGNORE, ROAD
-from roadeval.evaluation.score.unlabelled import chosen, entropy
+from roadeval.evaluation.score.unlabelled import choose_frames, entropy
 from roadeval.evaluation.stats.sampling import Estimate, draw_order, estimate
 from roadeval.pipeline.stage import View
 from roadeval.training.learning import fit
@@ -52,13 +52,13 @@ class Drive:
     errors: Values
 
 
-def measured(path: Path, preset: str, tables: dict[str, object]) -> Drive:
+def replay_drive(path: Path, preset: str, tables: dict[str, object]) -> Drive:
     """Replay a drive, with its truth to score and without it for the doubt."""
     options = {"record": "none", "figures": False}
     with TemporaryDirectory() as folder:
         for name, hidden in (("scored", {}), ("hidden", {"topics": {"truth": ""}})):
-            given = {} if hidden else tables
-            settings = {"preset": preset, "training": {"source": "patch"}, **given, **hidden}
+            more = hidden or tables
+            settings = {"preset": preset, "training": {"source": "patch"}, **more}
             config = roadeval.configure({**settings, "output": options})
             roadeval.replay(path, config, reports=Path(folder, name))
         rows = roadeval.Result(Path(folder, "scored")).frames
@@ -67,7 +67,7 @@ def measured(path: Path, preset: str, tables: dict[str, object]) -> Drive:
     doubt = doubt[doubt.variant == first]
     rows = rows[(rows.variant == first) & (rows.stage == doubt.stage.iloc[0])]
     both = doubt.merge(rows[["stamp_ns", "ERR"]], on="stamp_ns").dropna(subset="ERR")
-    sign = next(each for each in ("entropy", "disagreement") if both[each].notna().all())
+    sign = next(name for name in ("entropy", "disagreement") if both[name].notna().all())
     columns = (both[name].to_numpy() for name in ("stamp_ns", sign, "ERR"))
     return Drive(f"{path.stem}, {preset} ({sign})", *columns)
 
@@ -79,36 +79,38 @@ def of_idd(folder: Path) -> Drive:
     frames = [frame for drive in taught.values() for frame in drive]
     model = fit(frames, {"it": config.pipeline}, config.training)
     chain = config.pipeline.bind(model.parameters["it"])
-    found = []
+    pairs = []
     for frame in (frame for drive in scored.values() for frame in drive):
         assert frame.truth is not None
         outputs = [result.output for result in chain.run(View.of(frame.image))]
-        codes = next(each.probability for each in outputs if each.probability is not None)
+        codes = next(out.probability for out in outputs if out.probability is not None)
         mask = outputs[-1].mask.pixels()
-        if (known := frame.truth != IGNORE).any():
-            found.append((entropy(codes), np.mean((mask == ROAD)[known] != frame.truth[known])))
-    stamps = np.arange(len(found)) * SECOND
-    return Drive("IDD Lite, robust taught by other drives (entropy)", stamps, *np.array(found).T)
+        if (labelled := frame.truth != IGNORE).any():
+            wrong = (mask == ROAD)[labelled] != frame.truth[labelled]
+            pairs.append((entropy(codes), np.mean(wrong)))
+    stamps = np.arange(len(pairs)) * SECOND
+    return Drive("IDD Lite, robust taught by other drives (entropy)", stamps, *np.array(pairs).T)
 
 
-def tried(drive: Drive, labels: int) -> dict[str, tuple[float, float, float]]:
+def try_strategies(drive: Drive, labels: int) -> dict[str, tuple[float, float, float]]:
     """Return coverage, median width and worst frames found, in percent, by strategy."""
     count, truth = len(drive.errors), drive.errors.mean()
     worst = {*np.argsort(-drive.errors)[:WORST].tolist()}
     unknown = np.full(count, np.nan)
-    found: dict[str, list[tuple[bool, float, float]]] = {}
+    draws: dict[str, list[tuple[bool, float, float]]] = {}
 
-    def note(name: str, places: npt.NDArray[np.int64], own: Estimate) -> None:
-        assert own.low is not None
-        assert own.high is not None
+    def note(name: str, places: npt.NDArray[np.int64], guess: Estimate) -> None:
+        low, high = guess.low, guess.high
+        assert low is not None
+        assert high is not None
         hits = len(worst & {*places.tolist()}) / WORST
-        found.setdefault(name, []).append((own.low <= truth <= own.high, own.high - own.low, hits))
+        draws.setdefault(name, []).append((low <= truth <= high, high - low, hits))
 
     for seed in range(DRAWS):
-        random, ranked = chosen(drive.stamps, drive.scores, labels, seed)
+        random, ranked = choose_frames(drive.stamps, drive.scores, labels, seed)
         random = np.sort(random)
-        own = estimate(drive.errors[random], drive.scores[random], drive.scores)
-        note("pick", np.union1d(random, ranked), own)
+        guess = estimate(drive.errors[random], drive.scores[random], drive.scores)
+        note("pick", np.union1d(random, ranked), guess)
         drawn = np.sort(draw_order(count, seed)[:labels])
         note("random", drawn, estimate(drive.errors[drawn], unknown[drawn], unknown))
         start = np.random.default_rng(seed).uniform()
@@ -116,7 +118,7 @@ def tried(drive: Drive, labels: int) -> dict[str, tuple[float, float, float]]:
         note("uniform", even, estimate(drive.errors[even], unknown[even], unknown))
     doubtful = np.sort(np.argsort(-drive.scores)[:labels])
     note("doubtful", doubtful, estimate(drive.errors[doubtful], unknown[doubtful], unknown))
-    percent = {name: 100 * np.array(own, float).T for name, own in found.items()}
+    percent = {name: 100 * np.array(rows, float).T for name, rows in draws.items()}
     return {
         n: (float(h.mean()), float(np.median(w)), float(f.mean()))
         for n, (h, w, f) in percent.items()
@@ -132,7 +134,7 @@ def table(drives: list[Drive]) -> Iterator[str]:
     yield "| --- | --- | --- | --- | --- |"
     for drive in drives:
         for labels in LABELS:
-            by = tried(drive, labels)
+            by = try_strategies(drive, labels)
             cells = [
                 " / ".join(f"{by[name][place]:.{digits}f}" for name in STRATEGIES)
                 for place, digits in ((0, 0), (1, 1), (2, 0))
@@ -154,13 +156,13 @@ def main() -> None:
     drives = []
     for name, tables in CAMVID.items():
         path = options.drives / f"{name}.mcap"
-        drives += [measured(path, preset, tables) for preset in ("robust", "paper")]
+        drives += [replay_drive(path, preset, tables) for preset in ("robust", "paper")]
     drives.append(of_idd(options.idd))
     with TemporaryDirectory() as folder:
         for seed in SEEDS:
             path = Path(folder, f"synthetic_{seed}.mcap")
             write_drive(path, RenderSettings(seed=seed))
-            drives.append(measured(path, "robust", {}))
+            drives.append(replay_drive(path, "robust", {}))
     print("\n".join(table(drives)))
 
 

@@ -66,26 +66,26 @@ class PlainWay:
                 )
 
     def _layers(self, image: np.ndarray, variant: str) -> dict[str, np.ndarray]:
-        model, found, clock = self.models[variant], {}, perf_counter()
+        model, layers, clock = self.models[variant], {}, perf_counter()
         if variant != UNFILTERED:
             codes = reference.ndi_codes(image)
             shadow = reference.shadow_mask(codes)
             changed = np.clip(np.rint(reference.compensate(image, shadow)), 0, 255)
             image = changed.astype(np.uint8)
             rings = shadow + 2 * reference.rings(shadow)
-            found |= {"ndi": codes, "shadow": shadow, "rings": rings, "compensated": image}
+            layers |= {"ndi": codes, "shadow": shadow, "rings": rings, "compensated": image}
             clock = self._lap(f"{FILTERED} shadow", clock)
-        found["distance"] = reference.distance(image, model)
-        found["similarity"] = found["distance"] ** 2 <= reference.CHI2_95
+        layers["distance"] = reference.distance(image, model)
+        layers["similarity"] = layers["distance"] ** 2 <= reference.CHI2_95
         clock = self._lap(f"{variant} similarity", clock)
         # Not `decision`: a user asks for the classes.
         classes = model.machine.predict(image.reshape(-1, 3)).reshape(image.shape[:2])
-        found["svm"] = classes.astype(bool)
+        layers["svm"] = classes.astype(bool)
         clock = self._lap(f"{variant} svm", clock)
-        found["post"] = reference.post(found["svm"])
-        found["boundary"] = reference.boundary(found["post"])
+        layers["post"] = reference.post(layers["svm"])
+        layers["boundary"] = reference.boundary(layers["post"])
         self._lap(f"{variant} post", clock)
-        return found
+        return layers
 
     def _log(self, layers: dict[str, np.ndarray], where: str) -> None:
         start = perf_counter()

@@ -1,4 +1,4 @@
-"""What only a process of its own shows: peak memory, the start, and what a command costs in all."""
+"""Costs of a process of its own: peak memory, the start, and all of a command."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from benchmarks.timing import Cost
 
 ROADEVAL = Path(sys.executable).with_name("roadeval")
 
-# What the system counts for a finished child includes the parent's memory at its birth, and this
-# parent is large. The peak in /proc begins anew with a new program.
+# The system's count for a finished child includes the parent's memory at its birth, and this parent
+# is large. The peak in /proc begins anew with a new program.
 _PEAK = """
 import sys
 from pathlib import Path
@@ -34,7 +34,7 @@ def peak_mib(drive: Path, folder: Path, *words: str) -> float:
 
 
 def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, list[Cost]]:
-    """Return what each command costs, again and again, by what it does.
+    """Return the costs of several runs of each command, by its purpose.
 
     CPU is that of all its processes. A round before all warms the disk's cache, and leaves the
     recordings that the others read.
@@ -53,7 +53,7 @@ def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, li
     }
     for command in commands.values():
         _cost(*command)
-    return {name: [_cost(*each) for _ in range(runs)] for name, each in commands.items()}
+    return {name: [_cost(*words) for _ in range(runs)] for name, words in commands.items()}
 
 
 def seconds(drive: Path, folder: Path) -> tuple[float, float]:
@@ -78,7 +78,7 @@ def _replay(drive: Path, folder: Path) -> list[str]:
 
 
 def _cost(*words: str) -> Cost:
-    """Run a command; what it prints goes nowhere."""
+    """Run a command without its output."""
     command, start = [str(ROADEVAL), *words], perf_counter()
     quiet = [(os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)]
     pid = os.posix_spawn(command[0], command, os.environ, file_actions=quiet)

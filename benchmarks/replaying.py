@@ -35,18 +35,18 @@ NOISY: Final = (
     *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
 )
 HELD_BYTES: Final = 400 << 20
-"""Of layers computed beforehand and held for the floor, which goes round them."""
+"""Bytes of the layers that are computed beforehand and held for the floor, which repeats them."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """What the floor works on: files to decode, and finished frames to encode and write."""
+    """The work of the floor: files to decode, and finished frames to encode and write."""
 
     files: list[tuple[bytes, ...]]
     results: list[FrameResult]
     layout: Any
     layer_bytes: float
-    """Encoded, a frame, beyond the camera's own file and the truths."""
+    """Encoded bytes of a frame without the camera's own file and the truths."""
 
     def frames(self) -> Iterator[tuple[int, tuple[bytes, ...], FrameResult]]:
         """Yield every frame's number and files, with one of the held results."""
@@ -56,8 +56,8 @@ class Held:
             yield number, files, replace(result, frame=frame)
 
 
-class Whole:
-    """Stands where a recorder does, and hands out what it is given, layers and all."""
+class NoRecorder:
+    """Takes the place of a recorder, and returns results with all their layers."""
 
     def encode(self, result: FrameResult, _position: int) -> FrameResult:
         """Return the result."""
@@ -70,12 +70,12 @@ def lines_of(result: FrameResult) -> dict[str, str]:
 
 
 def hold(drive: Path, config: RunConfig) -> Held:
-    """Run the pipeline once, before any clock runs, and keep what the floor needs."""
+    """Run the pipeline once, before any clock runs, and return the work of the floor."""
     with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, (_, done) in enumerate(process([run], Whole(), ignore)):
+        for position, (_, done) in enumerate(process([run], NoRecorder(), ignore)):
             result = done.encoded
             if position % max(1, -(-len(run.frames) * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
@@ -88,14 +88,14 @@ def hold(drive: Path, config: RunConfig) -> Held:
 
 def _files(logged: LoggedFrame) -> tuple[bytes, ...]:
     pictures = [logged.picture, *(label.picture for label in logged.labels.values())]
-    return tuple(bytes(each.data) for each in pictures if not isinstance(each, Exception))
+    return tuple(bytes(picture.data) for picture in pictures if not isinstance(picture, Exception))
 
 
 def _layer_bytes(payloads: dict[str, bytes]) -> int:
     # Label images, if there are any, lie raw in a payload; the recording packs chunks with LZ4.
-    given = ("/camera", "/truth", "/true_shadow")
-    mine = (payload for path, payload in payloads.items() if path not in given)
-    return sum(min(len(p), len(lz4.block.compress(p))) for p in mine)
+    logged = ("/camera", "/truth", "/true_shadow")
+    layers = (payload for path, payload in payloads.items() if path not in logged)
+    return sum(min(len(p), len(lz4.block.compress(p))) for p in layers)
 
 
 def _bytes(result: FrameResult) -> int:
@@ -105,12 +105,12 @@ def _bytes(result: FrameResult) -> int:
 
 @contextmanager
 def library_codecs() -> Iterator[None]:
-    """Have PNG files encoded by OpenCV and zlib alone meanwhile.
+    """Encode PNG files by OpenCV and zlib alone meanwhile.
 
-    Both with the settings that make their smallest files of masks and noisy maps. A floor of these
-    stays what it is when the recording's encoder becomes faster.
+    Both have the settings of their smallest files of masks and noisy maps. A floor of these codecs
+    does not change when the recording's encoder becomes faster.
     """
-    own = codecs.crc32, codecs.compress, codecs.encode_levels
+    ours = codecs.crc32, codecs.compress, codecs.encode_levels
 
     def by_zlib(lines: np.ndarray) -> bytes:
         deflate = zlib.compressobj(1, zlib.DEFLATED, strategy=zlib.Z_RLE)
@@ -124,11 +124,13 @@ def library_codecs() -> Iterator[None]:
     try:
         yield
     finally:
-        codecs.crc32, codecs.compress, codecs.encode_levels = own
+        codecs.crc32, codecs.compress, codecs.encode_levels = ours
 
 
-def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[None]) -> Cost:
-    """Decode every file, encode and write the held layers, and no more.
+def measure_floor(
+    held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[None]
+) -> Cost:
+    """Measure how long it takes to decode every file, and to encode and write the held layers.
 
     ``codecs`` is `library_codecs`, or a `nullcontext` for the recording's own encoder.
     """
@@ -148,8 +150,8 @@ def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[No
     return meter.read()
 
 
-def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
-    """Do what `replay` does, without its training, its summary and its figures."""
+def measure_loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
+    """Measure `replay` without its training, its summary and its figures."""
     with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
@@ -162,12 +164,12 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
             cost = meter.read()
             sums = run.board.summary()
             results.append(csv_lines(run.key, sum_rows(run.board, sums.windows)))
-            results.finish(summary.of(run, sums, [], results.tables), "")
+            results.finish(summary.make_facts(run, sums, [], results.tables), "")
         return cost
 
 
-def whole(drive: Path, config: RunConfig, folder: Path) -> Cost:
-    """Call `replay` as a user does: training, tables and figures too."""
+def measure_replay(drive: Path, config: RunConfig, folder: Path) -> Cost:
+    """Measure `replay` as a user calls it, with training, tables and figures."""
     meter = Meter()
     roadeval.replay(drive, config, save=folder / "out.rrd", reports=folder / "reports")
     return meter.read()

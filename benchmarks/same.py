@@ -23,11 +23,11 @@ from roadeval.results.facts import Facts
 from roadeval.results.schema import TABLES
 
 OF_THE_RUN: Final = ("seconds", "versions", "run", "settings", "tables", "format")
-"""Parts of a summary that hold how it was made, not what was found."""
+"""Parts of a summary that hold how it was made, not its results."""
 
 
 INTERVALS: Final = ("summary.difference.", "summary.verdict")
-"""What begins so follows from how intervals are computed."""
+"""Beginnings of the places that depend on how intervals are computed."""
 
 
 def main() -> int:
@@ -40,17 +40,17 @@ def main() -> int:
     names = sorted(path.stem for path in options.old.glob("*.rrd"))
     failed = 0
     for name in names:
-        found = list(differences(options.old / name, options.new / name))
+        differing = list(differences(options.old / name, options.new / name))
         if options.but_intervals:
-            found = [each for each in found if not each.startswith(INTERVALS)]
-        print(f"{name}: {'; '.join(found) or 'the same'}", flush=True)
-        failed += bool(found)
+            differing = [place for place in differing if not place.startswith(INTERVALS)]
+        print(f"{name}: {'; '.join(differing) or 'the same'}", flush=True)
+        failed += bool(differing)
     print(f"{len(names) - failed} of {len(names)} runs give the same results")
     return 1 if failed or not names else 0
 
 
 def differences(old: Path, new: Path) -> Iterator[str]:
-    """Yield what differs between two runs, each given by its results folder."""
+    """Yield the differences of two runs, by their results folders."""
     for table in TABLES:
         yield from _file(old, new, f"{table}.csv")
     for figure in sorted(path.name for path in old.glob("*.png")):
@@ -58,7 +58,7 @@ def differences(old: Path, new: Path) -> Iterator[str]:
         if ours is None or not np.array_equal(theirs, ours):
             yield figure
     before, after = (Facts.read(folder / "summary.json").as_dict() for folder in (old, new))
-    yield from _values("summary", _found(before), _found(after))
+    yield from _values("summary", results_of(before), results_of(after))
     yield from _recordings(Recording(f"{old}.rrd"), Recording(f"{new}.rrd"))
 
 
@@ -70,13 +70,13 @@ def _file(old: Path, new: Path, name: str) -> Iterator[str]:
         yield name
 
 
-def _found(summary: dict[str, Any]) -> dict[str, Any]:
-    kept = {key: value for key, value in summary.items() if key not in OF_THE_RUN}
-    return {**kept, "log": summary["log"]["digest"], "frames": _counts(summary["frames"])}
+def results_of(summary: dict[str, Any]) -> dict[str, Any]:
+    results = {key: value for key, value in summary.items() if key not in OF_THE_RUN}
+    return {**results, "log": summary["log"]["digest"], "frames": _counts(summary["frames"])}
 
 
 def _counts(frames: dict[str, Any]) -> dict[str, Any]:
-    """Return the account of the frames, its reasons in order whatever their wording."""
+    """Return the account of the frames, with its reasons in order but without their wording."""
     return {**frames, "skipped": list(frames["skipped"].values())}
 
 
@@ -96,7 +96,7 @@ def _recordings(old: Recording, new: Recording) -> Iterator[str]:
         for spec in (*variant.layers, None):
             name = "errors" if spec is None else spec.name
             for frame in old.frame_numbers:
-                layers = [_layer(each, variant.name, name, frame) for each in (old, new)]
+                layers = [_layer(recording, variant.name, name, frame) for recording in (old, new)]
                 if not _equal(*layers):
                     yield f"recording: {variant.name}/{name} of frame {frame}"
                     break

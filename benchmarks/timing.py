@@ -30,7 +30,7 @@ class Spread:
 
 
 def ratios(these: Sequence[float], those: Sequence[float]) -> Spread:
-    """Divide what was measured side by side, round by round."""
+    """Divide measurements of the same round, round by round."""
     return Spread.of([a / b for a, b in zip(these, those, strict=True)])
 
 

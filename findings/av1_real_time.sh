@@ -14,9 +14,9 @@
 #
 # Source: the scheduling policy as `os.sched_getscheduler` returns it, before and after.
 set -euo pipefail
-[ "$(id -u)" = 0 ] || { echo "run as root: for other users the encoder changes nothing"; exit 1; }
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
+[ "$(id -u)" = 0 ] || { echo "run as root: for other users the encoder changes nothing"; exit 1; }
 python3 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet --no-compile --disable-pip-version-check av==18.1.0 numpy==2.4.6
 "$folder/venv/bin/python" - <<'PYTHON' 2> /dev/null

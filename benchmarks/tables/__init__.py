@@ -1,1 +1,1 @@
-"""The tables in README.md, PRESETS.md and the site, and what they are made from."""
+"""The tables in README.md, PRESETS.md and the site, and their numbers."""

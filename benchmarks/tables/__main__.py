@@ -1,4 +1,4 @@
-"""The tables in the documents, and whether they say what was measured.
+"""The tables in the documents, and a check that they have the measured numbers.
 
 python -m benchmarks.tables             checks all texts against benchmarks/tables/numbers.json
 python -m benchmarks.tables --write     writes the tables of all anew
@@ -32,37 +32,37 @@ from benchmarks.tables import (
     tuned,
 )
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
-from benchmarks.tables.measure import REPLAYS, SEEDS, STRANGERS, replayed, rounded
+from benchmarks.tables.measure import REPLAYS, SEEDS, STRANGERS, replay_seeds, round_all
 from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 
 ELSEWHERE = "elsewhere"
 TUNED = "tuned"
 WITH_A_PATH: Mapping[str, Callable[[Sources, Path], Any]] = {
-    "idd": lambda _, folder: idd.measured(folder, SEEDS),
+    "idd": lambda _, folder: idd.measure(folder, SEEDS),
     "idd_features": lambda _, folder: idd.without_each_group(folder),
-    "idd_filters": lambda _, folder: idd_filters.measured(folder),
-    "taught": taught.measured,
-    "reach_weights": reach_weights.measured,
-    TUNED: tuned.measured,
+    "idd_filters": lambda _, folder: idd_filters.measure(folder),
+    "taught": taught.measure,
+    "reach_weights": reach_weights.measure,
+    TUNED: tuned.measure,
 }
-"""Of the folder of IDD Lite, or of a network."""
+"""Names of the folder of IDD Lite and of a network in messages."""
 WHAT = {"idd": f"folder idd20k_lite of {idd.SOURCE}", "net": "ONNX file of a road network"}
 WITHOUT_FILES: Mapping[str, Callable[[], Any]] = {
-    "synthetic_shadow": synthetic_shadow.measured,
-    "stage_times": stage_times.measured,
-    "overlap": overlap.measured,
+    "synthetic_shadow": synthetic_shadow.measure,
+    "stage_times": stage_times.measure,
+    "overlap": overlap.measure,
 }
 OTHERS = (*WITH_A_PATH, *WITHOUT_FILES, ELSEWHERE)
 
 
 def main() -> int:
     """Check, write or measure; return the exit code."""
-    options = _arguments()
+    options = parse_arguments()
     if options.measure is not None:
         with tempfile.TemporaryDirectory() as made:
             try:
-                _measure(options, Path(options.work or made))
+                measure_parts(options, Path(options.work or made))
             except MissingSourceError as error:
                 sys.exit(str(error))
         if not options.write:
@@ -71,54 +71,54 @@ def main() -> int:
     if options.write:
         for path in DOCUMENTS:
             path.write_text(written(path.read_text(), numbers))
-    found = [
+    problems = [
         f"{path.name}: {fault}" for path in DOCUMENTS for fault in faults(path.read_text(), numbers)
     ]
-    for each in found:
-        print(each, file=sys.stderr)
-    return 1 if found else 0
+    for problem in problems:
+        print(problem, file=sys.stderr)
+    return 1 if problems else 0
 
 
-def _measure(options: argparse.Namespace, work: Path) -> None:
-    """Measure what was named, or everything; every result is kept at once."""
+def measure_parts(options: argparse.Namespace, work: Path) -> None:
+    """Measure the named parts, or everything, and store every result at once."""
     work.mkdir(parents=True, exist_ok=True)
     sources = Sources(work, options.logs, options.camvid, options.comma10k, options.idd)
     names = options.measure or [*DRIVES, *([] if options.replays else OTHERS)]
     for name in names:
         if name in WITHOUT_FILES:
-            found = WITHOUT_FILES[name]()
-            _keep(found if name == "overlap" else rounded(found), name)
+            numbers = WITHOUT_FILES[name]()
+            store(numbers if name == "overlap" else round_all(numbers), name)
             continue
         if name in WITH_A_PATH:
             flag = "net" if name == TUNED else "idd"
             path = getattr(options, flag)
             if path is None:
                 sys.exit(f"{name}: name the {WHAT[flag]} (--{flag})")
-            _keep(rounded(WITH_A_PATH[name](sources, path)), name)
+            store(round_all(WITH_A_PATH[name](sources, path)), name)
             continue
         if name == ELSEWHERE:
             for stranger in STRANGERS.values():
-                _keep(taught.trained_elsewhere(stranger, sources), ELSEWHERE, stranger.name)
+                store(taught.trained_elsewhere(stranger, sources), ELSEWHERE, stranger.name)
             continue
         for key, replay in REPLAYS.items():
             if name in replay.drives and key in (options.replays or REPLAYS):
                 begin = time.monotonic()
-                _keep(replayed(key, DRIVES[name], sources), "drives", name, key)
+                store(replay_seeds(key, DRIVES[name], sources), "drives", name, key)
                 print(f"{name} {key}: {time.monotonic() - begin:.0f} s", flush=True)
 
 
-def _keep(found: Any, *place: str) -> None:
-    """Put numbers in their place in the file."""
+def store(result: Any, *place: str) -> None:
+    """Store a result in its place in the file."""
     numbers = load() if NUMBERS.exists() else {}
     numbers |= {"roadeval": VERSION, "seeds": SEEDS}
     here = numbers
     for name in place[:-1]:
         here = here.setdefault(name, {})
-    here[place[-1]] = found
+    here[place[-1]] = result
     NUMBERS.write_text(json.dumps(numbers, indent=1, sort_keys=True) + "\n")
 
 
-def _arguments() -> argparse.Namespace:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.tables",
         description=__doc__,

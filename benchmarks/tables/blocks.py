@@ -1,4 +1,4 @@
-"""What stands between the marks: tables and sentences, each made of the numbers."""
+"""Blocks of the texts: tables and sentences made of the numbers."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ SURE: Final = 0.05
 """The p-value below which a difference stands, as in roadeval's own verdicts."""
 MARK: Final = "\\*"
 NONE: Final = "-"
-"""Where nothing was measured."""
+"""Text for a number that was not measured."""
 ERR_AT_MOST: Final = {"camvid_0016E5_15hz": 0.04, "camvid_0006R0_1hz": 0.025}
-"""What `robust` was to reach on the drives that it was developed on."""
+"""Greatest ERR that `robust` had to reach on the drives that it was developed on."""
 IDD_ERR_AT_MOST: Final = 0.045
 ADAPTED: Final = {None: "no", "truth": "its first ten frames", "patch": "the same, without labels"}
 NOT_BELOW: Final = 4
-"""Of IDD's drives, on which `blind` may be as good."""
+"""Greatest number of IDD's drives on which `blind` may be as good."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +37,19 @@ class Block:
 
 def _err(numbers: Numbers, drive: str, replay: str, variant: str) -> list[float]:
     """Return ERR with each seed."""
-    found: list[float] = numbers["drives"][drive][replay]["variants"][variant]["ERR"]
-    return found
+    errs: list[float] = numbers["drives"][drive][replay]["variants"][variant]["ERR"]
+    return errs
 
 
 def _spread_or_none(numbers: Numbers, drive: str, replay: str, variant: str) -> str:
-    """Return the spread of ERR; a dash where the replay was not made."""
+    """Return the spread of ERR; a dash if the replay was not made."""
     made = replay in numbers["drives"][drive]
     return _spread(_err(numbers, drive, replay, variant)) if made else NONE
 
 
 def _blind(numbers: Numbers, drive: str) -> float:
-    found: float = numbers["drives"][drive]["paper"]["blind"]["ERR"]
-    return found
+    err: float = numbers["drives"][drive]["paper"]["blind"]["ERR"]
+    return err
 
 
 def _percent(fraction: float) -> str:
@@ -95,14 +95,14 @@ def _untouched() -> list[Drive]:
 
 
 def findings(numbers: Numbers) -> str:
-    """Return what was found, in five lines."""
-    return "\n".join(map(_item, _findings(numbers)))
+    """Return the findings in five lines."""
+    return "\n".join(map(_item, finding_sentences(numbers)))
 
 
-def _findings(numbers: Numbers) -> Iterator[str]:
+def finding_sentences(numbers: Numbers) -> Iterator[str]:
     changes = {name: numbers["drives"][name]["paper"]["filter"]["ERR"]["seeds"] for name in DRIVES}
-    middles = [round(100 * median(each), 1) for each in changes.values()]
-    up, down = ([each for each in middles if sign * each > 0] for sign in (1, -1))
+    middles = [round(100 * median(seeds), 1) for seeds in changes.values()]
+    up, down = ([middle for middle in middles if sign * middle > 0] for sign in (1, -1))
     yield (
         f"The filter of the paper raises ERR on {len(up)} of {len(DRIVES)} drives, by up to "
         f"{max(up):.1f} points. It lowers ERR on {len(down)}, by up to {-min(down):.1f}."
@@ -112,22 +112,22 @@ def _findings(numbers: Numbers) -> Iterator[str]:
         f"`blind` never looks at the image. The pipeline of the paper beats it on {below} of "
         f"{len(DRIVES)} drives."
     )
-    own = [name for name in DRIVES if _has_robust(numbers, name)]
-    errs = [median(_err(numbers, name, "robust", "unfiltered")) for name in own]
-    blind = [_blind(numbers, name) for name in own]
+    replayed = [name for name in DRIVES if _has_robust(numbers, name)]
+    errs = [median(_err(numbers, name, "robust", "unfiltered")) for name in replayed]
+    blind = [_blind(numbers, name) for name in replayed]
     yield (
-        f"The preset `robust` gets {_range(errs)} % of the pixels wrong on {len(own)} drives, and "
-        f"`blind` {_range(blind)} %."
+        f"The preset `robust` gets {_range(errs)} % of the pixels wrong on {len(replayed)} drives, "
+        f"and `blind` {_range(blind)} %."
     )
     lite = numbers["idd"]
-    found = {name: _percent(median(each["ERR"])) for name, each in lite["variants"].items()}
+    errs_of = {name: _percent(median(rates["ERR"])) for name, rates in lite["variants"].items()}
     yield (
-        f"On {lite['labelled']} drives of IDD Lite: `robust` {found['robust']} %, `blind` "
-        f"{_percent(lite['blind']['ERR'])} %, no filter {found['unfiltered']} %, `paper` "
-        f"{found['paper']} %."
+        f"On {lite['labelled']} drives of IDD Lite: `robust` {errs_of['robust']} %, `blind` "
+        f"{_percent(lite['blind']['ERR'])} %, no filter {errs_of['unfiltered']} %, `paper` "
+        f"{errs_of['paper']} %."
     )
-    held = [numbers["drives"][name]["paper"]["claims"]["filter_ERR"] for name in DRIVES]
-    right, windows = (sum(each[key] for each in held) for key in ("held", "windows"))
+    claimed = [numbers["drives"][name]["paper"]["claims"]["filter_ERR"] for name in DRIVES]
+    right, windows = (sum(claim[key] for claim in claimed) for key in ("held", "windows"))
     yield f"The paper says that its filter lowers ERR: {right} of {windows} windows bear it out."
 
 
@@ -139,15 +139,15 @@ def _range(errs: Sequence[float]) -> str:
 
 
 def drives(numbers: Numbers) -> str:
-    """Return ERR of every preset on every drive, and what became of the filters."""
+    """Return ERR of every preset on every drive, and the effects of the filters."""
     head = ["ERR, %", "`blind`", *FINAL_MASKS]
     rows = [
         [drive.title + (" ¹" if drive.tuned else ""), *_bold(_middles(numbers, drive.name))]
         for drive in DRIVES.values()
     ]
     lite = numbers["idd"]
-    own = {name: _percent(median(each["ERR"])) for name, each in lite["variants"].items()}
-    errs = [own["unfiltered"], own["paper"], NONE, NONE, own["robust"]]
+    by_name = {name: _percent(median(rates["ERR"])) for name, rates in lite["variants"].items()}
+    errs = [by_name["unfiltered"], by_name["paper"], NONE, NONE, by_name["robust"]]
     rows.append(
         [f"IDD Lite, {lite['labelled']} drives ¹", *_bold([_percent(lite["blind"]["ERR"]), *errs])]
     )
@@ -166,20 +166,20 @@ FINAL_MASKS: Final = {
 
 def _middles(numbers: Numbers, drive: str) -> list[str]:
     """Return ERR of the baseline and of each of `FINAL_MASKS`, the middle of the seeds."""
-    found = numbers["drives"][drive]
+    replays = numbers["drives"][drive]
     errs = [
-        _percent(median(_err(numbers, drive, *column))) if column[0] in found else NONE
+        _percent(median(_err(numbers, drive, *column))) if column[0] in replays else NONE
         for column in FINAL_MASKS.values()
     ]
     return [_percent(_blind(numbers, drive)), *errs]
 
 
 def _on_filters(numbers: Numbers) -> Iterator[str]:
-    """Yield what became of each filter, and of `robust`, on all drives together."""
+    """Yield the effects of each filter, and of `robust`, on all drives together."""
     for replay in ("paper", "gated"):
         on = REPLAYS[replay].drives
         changes = {name: numbers["drives"][name][replay]["filter"]["ERR"] for name in on}
-        middles = {name: round(100 * median(each["seeds"]), 1) for name, each in changes.items()}
+        middles = {name: round(100 * median(c["seeds"]), 1) for name, c in changes.items()}
         up = {name: middle for name, middle in middles.items() if middle > 0}
         down = {name: middle for name, middle in middles.items() if middle < 0}
         words = [
@@ -194,20 +194,20 @@ def _on_filters(numbers: Numbers) -> Iterator[str]:
 
 def _on_robust(numbers: Numbers) -> Iterator[str]:
     margins = {name: _margins(numbers, name) for name in DRIVES if _has_robust(numbers, name)}
-    below = sum(median(each) < 0 for each in margins.values())
+    below = sum(median(seeds) < 0 for seeds in margins.values())
     yield f"`robust` is below `blind` on {below} of the {len(margins)} drives it was replayed on"
-    close = [DRIVES[name].title for name, each in margins.items() if max(each) >= 0]
+    close = [DRIVES[name].title for name, seeds in margins.items() if max(seeds) >= 0]
     yield f"(not with every seed on {_and(close)});" if close else "with every seed;"
     lite = numbers["idd"]
     lost = lite["variants"]["robust"]["not_below_blind"]
     seeds = " to ".join(map(str, sorted({min(lost), max(lost)})))
     yield f"it is not on {seeds} of IDD's {lite['labelled']}."
-    found = {name: numbers["elsewhere"][name] for name in STRANGERS}
+    rates = {name: numbers["elsewhere"][name] for name in STRANGERS}
     beaten = [
-        f"{STRANGERS[name].title} ({_percent(median(each['ERR']))} against "
-        f"{_percent(each['blind'])} %)"
-        for name, each in found.items()
-        if median(each["ERR"]) >= each["blind"]
+        f"{STRANGERS[name].title} ({_percent(median(rates[name]['ERR']))} against "
+        f"{_percent(rates[name]['blind'])} %)"
+        for name in rates
+        if median(rates[name]["ERR"]) >= rates[name]["blind"]
     ]
     teacher = DRIVES[TEACHER].title
     all_of = f" is below `blind` on all {len(STRANGERS)} others that were scored with it"
@@ -220,7 +220,7 @@ def _item(words: str) -> str:
 
 
 def _sure(changes: Sequence[Mapping[str, float]]) -> str:
-    return str(sum(each["p_holm"] < SURE for each in changes) or "none")
+    return str(sum(change["p_holm"] < SURE for change in changes) or "none")
 
 
 def _has_robust(numbers: Numbers, drive: str) -> bool:
@@ -228,24 +228,24 @@ def _has_robust(numbers: Numbers, drive: str) -> bool:
 
 
 def _margins(numbers: Numbers, drive: str) -> list[float]:
-    """Return ERR of `robust` minus that of `blind`, with each seed."""
+    """Return ERR of `robust` minus the ERR of `blind`, with each seed."""
     blind = _blind(numbers, drive)
-    return [each - blind for each in _err(numbers, drive, "robust", "unfiltered")]
+    return [err - blind for err in _err(numbers, drive, "robust", "unfiltered")]
 
 
 def claims(numbers: Numbers) -> str:
-    """Return the paper's claims with the windows of all drives that bear them out."""
+    """Return the paper's claims with the windows of all drives that confirm them."""
     rows = []
     for name, words in CLAIMED.items():
-        found = [numbers["drives"][drive]["paper"]["claims"][name] for drive in DRIVES]
-        held, windows = (sum(each[key] for each in found) for key in ("held", "windows"))
-        every = sum(each["held"] == each["windows"] for each in found)
+        claimed = [numbers["drives"][drive]["paper"]["claims"][name] for drive in DRIVES]
+        held, windows = (sum(claim[key] for claim in claimed) for key in ("held", "windows"))
+        every = sum(claim["held"] == claim["windows"] for claim in claimed)
         rows.append([words, f"{held} of {windows}", f"{every} of {len(DRIVES)}"])
     return _table(["claim", "windows that bear it out", "drives where every window does"], rows)
 
 
 def order(numbers: Numbers) -> str:
-    """Return ERR of `paper` with one thing as printed, on drives that it was not chosen on."""
+    """Return ERR of `paper` with one part as printed, on drives that no choice was made on."""
     others = [*_untouched(), *_synthetic()]
     variants = {"`paper`": "filtered", "`printed_order`": "printed_order", "`hsi`": "hsi"}
     return _table(
@@ -258,15 +258,15 @@ def order(numbers: Numbers) -> str:
 
 
 def perfect_shadow(numbers: Numbers) -> str:
-    """Return what the paper's compensation does to shadow that is found without an error."""
-    found = [numbers["drives"][drive.name]["paper"]["perfect_shadow"] for drive in _synthetic()]
-    errs = {key: _and([_percent(each[key]) for each in found]) for key in found[0]}
-    worse = sum(each["perfect"] > each["unfiltered"] for each in found)
+    """Return the effect of the paper's compensation on perfectly detected shadow."""
+    rates = [numbers["drives"][drive.name]["paper"]["perfect_shadow"] for drive in _synthetic()]
+    errs = {key: _and([_percent(drive[key]) for drive in rates]) for key in rates[0]}
+    worse = sum(drive["perfect"] > drive["unfiltered"] for drive in rates)
     return textwrap.fill(
         "A better shadow mask would not mend it. On synthetic roads the true shadow is known, and "
         "a replay runs the filter on that, too (`oracles.csv`). With a perfect shadow mask ERR is "
         f"{errs['perfect']} % on the three drives, with the filter's own {errs['filtered']} %, and "
-        f"without the filter {errs['unfiltered']} %: on {worse} of {len(found)} the compensation "
+        f"without the filter {errs['unfiltered']} %: on {worse} of {len(rates)} the compensation "
         "harms even where nothing but shadow is compensated. A region gets the mean and the "
         "deviation of its ring, whatever the ring shows.",
         100,
@@ -304,7 +304,7 @@ def spreads(numbers: Numbers) -> str:
 
 
 def filters(numbers: Numbers) -> str:
-    """Return what each filter does to ERR, with its interval and the spread of the seeds."""
+    """Return the effect of each filter on ERR, with its interval and the spread of the seeds."""
     rows = []
     for drive in DRIVES.values():
         row = [drive.title]
@@ -321,33 +321,33 @@ def filters(numbers: Numbers) -> str:
 
 
 def against_blind(numbers: Numbers) -> str:
-    """Return every preset's ERR minus that of the baseline."""
+    """Return every preset's ERR minus the baseline's."""
     rows = []
     for drive in DRIVES.values():
-        row, found = [drive.title], numbers["drives"][drive.name]
+        row, replays = [drive.title], numbers["drives"][drive.name]
         for replay, variant in FINAL_MASKS.values():
-            made = replay in found
-            row.append(_interval(found[replay]["against_blind"][variant]) if made else NONE)
-        own = _has_robust(numbers, drive.name)
-        rows.append([*row, _spread(_margins(numbers, drive.name), _points) if own else NONE])
+            made = replay in replays
+            row.append(_interval(replays[replay]["against_blind"][variant]) if made else NONE)
+        has_robust = _has_robust(numbers, drive.name)
+        rows.append([*row, _spread(_margins(numbers, drive.name), _points) if has_robust else NONE])
     return _table(["ERR minus `blind`, points", *FINAL_MASKS, "`robust`: seeds"], rows)
 
 
 def placement(numbers: Numbers) -> str:
     """Return ERR of `robust` trained on a drive's first ten frames, and on ten spread along it."""
     on = REPLAYS["spread"].drives
-    found = {name: numbers["drives"][name] for name in on}
+    replays = {name: numbers["drives"][name] for name in on}
     return _table(
         ["`robust`: ERR, %", "frames", "first ten train", "frames", "ten along the drive train"],
         (
             [
                 DRIVES[name].title,
-                str(each["robust"]["frames"]),
+                str(replay["robust"]["frames"]),
                 _spread(_err(numbers, name, "robust", "unfiltered")),
-                str(each["spread"]["frames"]),
+                str(replay["spread"]["frames"]),
                 _spread(_err(numbers, name, "spread", "unfiltered")),
             ]
-            for name, each in found.items()
+            for name, replay in replays.items()
         ),
     )
 
@@ -356,28 +356,28 @@ def unlabelled(numbers: Numbers) -> str:
     """Return ERR of `robust` that has learnt from a drive's first ten frames without labels."""
     rows = []
     for name in REPLAYS["patch"].drives:
-        found = numbers["drives"][name]["patch"]
+        replay = numbers["drives"][name]["patch"]
         rows.append(
             [
                 DRIVES[name].title,
-                str(found["frames"]),
-                _percent(found["blind"]["ERR"]),
-                _spread(found["variants"]["unfiltered"]["ERR"]),
-                _interval(found["against_blind"]["unfiltered"]),
+                str(replay["frames"]),
+                _percent(replay["blind"]["ERR"]),
+                _spread(replay["variants"]["unfiltered"]["ERR"]),
+                _interval(replay["against_blind"]["unfiltered"]),
             ]
         )
     return _table(["ERR, %", "frames", "`blind`, with labels", "`robust`, without", "points"], rows)
 
 
 def times(numbers: Numbers) -> str:
-    """Return what each stage of the presets costs."""
+    """Return the cost of cost stage of the presets."""
     return _table(
         ["640x480, one core", "ms by stage", "together"],
         (
             [
                 f"`{preset}`",
-                ", ".join(f"`{stage}` {each:.1f}" for stage, each in stages),
-                f"{sum(each for _, each in stages):.1f}",
+                ", ".join(f"`{stage}` {cost:.1f}" for stage, cost in stages),
+                f"{sum(cost for _, cost in stages):.1f}",
             ]
             for preset, stages in numbers["stage_times"]
         ),
@@ -385,24 +385,30 @@ def times(numbers: Numbers) -> str:
 
 
 def claims_by_drive(numbers: Numbers) -> str:
-    """Return the windows of each drive that bear out each claim."""
+    """Return the windows of each drive that confirm each claim."""
     head = ["claim", *(drive.title for drive in DRIVES.values())]
     return _table(
         head,
         (
-            [words, *(_held(numbers["drives"][drive]["paper"]["claims"][name]) for drive in DRIVES)]
+            [
+                words,
+                *(
+                    claim_cell(numbers["drives"][drive]["paper"]["claims"][name])
+                    for drive in DRIVES
+                ),
+            ]
             for name, words in CLAIMED.items()
         ),
     )
 
 
-def _held(found: Mapping[str, int]) -> str:
-    short = f" + {found['short_held']}/{found['short']}" if found["short"] else ""
-    return f"{found['held']}/{found['windows']}{short}"
+def claim_cell(claim: Mapping[str, int]) -> str:
+    short = f" + {claim['short_held']}/{claim['short']}" if claim["short"] else ""
+    return f"{claim['held']}/{claim['windows']}{short}"
 
 
 def idd_lite(numbers: Numbers) -> str:
-    """Return the rates on IDD Lite, with the drives where `blind` is not beaten."""
+    """Return the rates on IDD Lite, with the drives that do not beat `blind`."""
     lite = numbers["idd"]
     blind = lite["blind"]
     rows = [["`blind`", _percent(blind["ERR"]), _percent(blind["dark_missed"]), "", "", ""]]
@@ -412,16 +418,16 @@ def idd_lite(numbers: Numbers) -> str:
         idd.UNLABELLED: "`robust`, no labels",
     }
     for name in (*idd.VARIANTS, idd.UNLABELLED):
-        found = lite["variants"][name]
-        own, lost = found.get("against_unfiltered"), found["not_below_blind"]
+        rates = lite["variants"][name]
+        change, lost = rates.get("against_unfiltered"), rates["not_below_blind"]
         rows.append(
             [
                 titles.get(name, f"`{name}`"),
-                _spread(found["ERR"]),
-                _spread(found["dark_missed"]),
+                _spread(rates["ERR"]),
+                _spread(rates["dark_missed"]),
                 f"{median(lost)} ({min(lost)} to {max(lost)}) of {lite['labelled']}",
-                _interval(found["against_blind"]),
-                _interval(own) if own else "",
+                _interval(rates["against_blind"]),
+                _interval(change) if change else "",
             ]
         )
     return _table(
@@ -434,17 +440,17 @@ def idd_lite(numbers: Numbers) -> str:
 
 
 def filter_effects(numbers: Numbers) -> str:
-    """Return what the gated filter does on IDD Lite."""
-    found = numbers["idd_filters"]
+    """Return the effects of the gated filter on IDD Lite."""
+    chains = numbers["idd_filters"]
     rows = []
     for chain in idd_filters.CHAINS:
-        none = found[chain]["none"]
+        none = chains[chain]["none"]
         rates = [_spread(none[rate]) for rate in ("ERR", "dark_missed")]
         title = chain if chain == "colours" else f"`{chain}`"
         rows.append([title, "no filter", rates[0], "", rates[1], "", ""])
         for odds in map("{:g}".format, idd_filters.ODDS):
-            seeds = sorted(found[chain][odds], key=lambda each: each["change"]["mean"])
-            rates = [_spread([each[rate] for each in seeds]) for rate in ("ERR", "dark_missed")]
+            seeds = sorted(chains[chain][odds], key=lambda seed: seed["change"]["mean"])
+            rates = [_spread([seed[rate] for seed in seeds]) for rate in ("ERR", "dark_missed")]
             middle = seeds[len(seeds) // 2]
             change, dark, flat = (
                 _interval(middle[key]) for key in ("change", "dark_change", "flat_change")
@@ -453,7 +459,7 @@ def filter_effects(numbers: Numbers) -> str:
     return _table(
         [
             *("before", "`odds`", "ERR, %", "filter's effect, points", "dark road missed, %"),
-            *("filter's effect, points", f"on {found['flat_frames']} flat frames, ERR, points"),
+            *("filter's effect, points", f"on {chains['flat_frames']} flat frames, ERR, points"),
         ],
         rows,
     )
@@ -463,10 +469,10 @@ def shadow_found(numbers: Numbers) -> str:
     """Return precision and recall of the filters' shadow on synthetic roads."""
     rows = []
     for preset, drives in numbers["synthetic_shadow"].items():
-        for name, found in drives.items():
+        for name, shares in drives.items():
             kinds = ("precision", "recall", "recall_on_road")
             rows.append(
-                [f"`{preset}`", DRIVES[name].title, *(f"{found[kind]:.2f}" for kind in kinds)]
+                [f"`{preset}`", DRIVES[name].title, *(f"{shares[kind]:.2f}" for kind in kinds)]
             )
     return _table(
         ["filter", "drive", "precision", "recall, all shadow", "recall, shadow on road"], rows
@@ -474,19 +480,19 @@ def shadow_found(numbers: Numbers) -> str:
 
 
 def features(numbers: Numbers) -> str:
-    """Return what ERR of `robust` becomes without each group of its features."""
-    found = numbers["idd_features"]
-    rows = [["none", _percent(found["ERR"]), _percent(found["dark_missed"]), ""]]
-    for name, each in found["without"].items():
-        own = _percent(found["ERR"] + each["mean"])
-        mean, low, high = (f"{100 * each[key]:+.2f}" for key in ("mean", "low", "high"))
-        dark = _percent(each["dark_missed"])
-        rows.append([f"`{name}`", own, dark, f"{mean} [{low}, {high}]"])
+    """Return ERR of `robust` without each group of its features."""
+    full = numbers["idd_features"]
+    rows = [["none", _percent(full["ERR"]), _percent(full["dark_missed"]), ""]]
+    for name, change in full["without"].items():
+        err = _percent(full["ERR"] + change["mean"])
+        mean, low, high = (f"{100 * change[key]:+.2f}" for key in ("mean", "low", "high"))
+        dark = _percent(change["dark_missed"])
+        rows.append([f"`{name}`", err, dark, f"{mean} [{low}, {high}]"])
     return _table(["taken away", "ERR, %", "dark road missed, %", "points"], rows)
 
 
 def aims(numbers: Numbers) -> str:
-    """Return what `robust` was to reach where it was developed, and what it does."""
+    """Return the aims of `robust` on the drives of its development, and its results."""
     lite = numbers["idd"]["variants"]["robust"]
     drives = {name: _err(numbers, name, "robust", "unfiltered") for name in ERR_AT_MOST}
     rates = [
@@ -501,45 +507,45 @@ def aims(numbers: Numbers) -> str:
         [
             title,
             show.format(factor * most),
-            show.format(factor * median(found)),
-            "missed" if median(found) > most else "reached",
+            show.format(factor * median(rate)),
+            "missed" if median(rate) > most else "reached",
         ]
-        for title, found, most, show, factor in rates
+        for title, rate, most, show, factor in rates
     )
     return _table(["`robust`", "at most", "middle seed", ""], rows)
 
 
 def elsewhere(numbers: Numbers) -> str:
-    """Return ERR of `robust` where it was trained on another drive."""
+    """Return ERR of `robust` trained on another drive."""
     return _table(
         ["trained on CamVid 0006R0: ERR, %", "`blind`", "`robust`", "minus `blind`, points"],
         (
             [
                 STRANGERS[name].title,
-                _percent(found["blind"]),
-                _spread(found["ERR"]),
-                _interval(found["against_blind"]),
+                _percent(rates["blind"]),
+                _spread(rates["ERR"]),
+                _interval(rates["against_blind"]),
             ]
-            for name, found in ((name, numbers["elsewhere"][name]) for name in STRANGERS)
+            for name, rates in ((name, numbers["elsewhere"][name]) for name in STRANGERS)
         ),
     )
 
 
 def taught_by(numbers: Numbers) -> str:
-    """Return ERR of `robust` on CamVid's logs, taught by others, with and without own frames."""
+    """Return ERR of `robust` on CamVid's logs, trained on others, with and without own frames."""
     titles = {taught.IDD_LITE: "IDD Lite", **{name: DRIVES[name].title for name in DRIVES}}
     return _table(
         ["trained on", "scored on", "`--adapt`", "`blind`, ERR, %", "`robust`", "points"],
         (
             [
-                titles[found["teacher"]],
-                titles[found["pupil"]],
-                ADAPTED[found["adapt"]],
-                _percent(found["blind"]),
-                _spread(found["ERR"]),
-                _interval(found["against_blind"]),
+                titles[rates["teacher"]],
+                titles[rates["pupil"]],
+                ADAPTED[rates["adapt"]],
+                _percent(rates["blind"]),
+                _spread(rates["ERR"]),
+                _interval(rates["against_blind"]),
             ]
-            for found in numbers["taught"]
+            for rates in numbers["taught"]
         ),
     )
 
@@ -557,7 +563,7 @@ def weights(numbers: Numbers) -> str:
     return _table(
         [
             *("trained on", "scored on", "rate"),
-            *(f"weight {each:g}" for each in reach_weights.WEIGHTS),
+            *(f"weight {weight:g}" for weight in reach_weights.WEIGHTS),
         ],
         (
             [teachers[row["teacher"]], pupils[row["pupil"]], title, *map(_percent, row[rate])]
@@ -569,7 +575,7 @@ def weights(numbers: Numbers) -> str:
 
 
 def tuned_network(numbers: Numbers) -> str:
-    """Return ERR of a network as it comes, with a trained threshold, and tuned."""
+    """Return ERR of a network unchanged, with a trained threshold, and tuned."""
     titles = {name: drive.title for name, drive in DRIVES.items()}
     titles["idd"] = "IDD Lite, the other half of its drives teaches"
     columns = {
@@ -581,15 +587,15 @@ def tuned_network(numbers: Numbers) -> str:
     rows = (
         [
             titles[name],
-            _percent(found["blind"]),
+            _percent(errs["blind"]),
             *(
-                _spread(found[key]) if len({*found[key]}) > 1 else _percent(found[key][0])
+                _spread(errs[key]) if len({*errs[key]}) > 1 else _percent(errs[key][0])
                 for key in columns.values()
             ),
-            _interval(found["change"]),
-            _interval(found["against_network"]),
+            _interval(errs["change"]),
+            _interval(errs["against_network"]),
         ]
-        for name, found in numbers["tuned"]["drives"].items()
+        for name, errs in numbers["tuned"]["drives"].items()
     )
     minus = "tuned minus `robust`, points", "minus the network"
     return _table(["ERR, %", "`blind`", *columns, *minus], rows)
@@ -598,10 +604,10 @@ def tuned_network(numbers: Numbers) -> str:
 def flicker(numbers: Numbers) -> str:
     """Return how much of each mask changes from frame to frame."""
     drive = "camvid_0016E5_15hz"
-    found = numbers["drives"][drive]
-    paper, robust = (found[replay]["variants"] for replay in ("paper", "robust"))
+    replays = numbers["drives"][drive]
+    paper, robust = (replays[replay]["variants"] for replay in ("paper", "robust"))
     shares = {
-        "in the truth": found["paper"]["truth_flicker"],
+        "in the truth": replays["paper"]["truth_flicker"],
         "with `robust`": robust["unfiltered"]["flicker"],
         "with `paper`": paper["filtered"]["flicker"],
         "with colours and no filter": paper["unfiltered"]["flicker"],
@@ -612,17 +618,17 @@ def flicker(numbers: Numbers) -> str:
 
 def overlap_numbers(numbers: Numbers) -> str:
     """Return every overlap number with its definition and both of its values."""
-    found = numbers["overlap"]
+    compared = numbers["overlap"]
     head = ["number", "stands in", "definition", "is that of", "demo, %", "again, %", "again by"]
     rows, apart = [], 0.0
     for number in overlap.NUMBERS:
-        own, other = (found["values"][number.name][whose] for whose in ("roadeval", "library"))
-        apart = max(apart, abs(own - other))
-        values = (f"{100 * value:.4f}" for value in (own, other))
+        ours, theirs = (compared["values"][number.name][side] for side in ("roadeval", "library"))
+        apart = max(apart, abs(ours - theirs))
+        values = (f"{100 * value:.4f}" for value in (ours, theirs))
         words = number.stands, number.definition, number.reported_by
         rows.append([number.name, *words, *values, number.library])
     tail = (
-        f"Of {found['evaluated']} frames of the demo drive with `robust`. The two values of a "
+        f"Of {compared['evaluated']} frames of the demo drive with `robust`. The two values of a "
         f"number differ by {apart:.0e} at most, and may differ by {overlap.CLOSE:.0e}. The "
         f"definitions of others are those of {overlap.READ}."
     )
@@ -656,4 +662,4 @@ BLOCKS: Final = {
     "overlap": Block(overlap_numbers, (f"{MEASURE} overlap",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }
-"""By the names in the marks."""
+"""Blocks by their names in the marks."""

@@ -1,4 +1,4 @@
-"""The drives of the tables: where each comes from, and what its truth is called."""
+"""The drives of the tables: where each comes from, and the names of its truth."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Drive:
 
 
 def synthetic(seed: int) -> Callable[[Sources, str], Path]:
-    """Return what renders the synthetic drive of a seed."""
+    """Return a function that renders the synthetic drive of a seed."""
 
     def find(sources: Sources, name: str) -> Path:
         path = sources.work / f"{name}.mcap"
@@ -89,7 +89,7 @@ def log(sources: Sources, name: str) -> Path:
 
 
 def packed(journey: str, first: int = 0, last: int = 99_999) -> Callable[[Sources, str], Path]:
-    """Return what packs the frames of a CamVid journey, both ends included, as one a second."""
+    """Return a function that packs the frames of a CamVid journey, ends included, one a second."""
 
     def find(sources: Sources, name: str) -> Path:
         if sources.camvid is None:

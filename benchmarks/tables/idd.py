@@ -25,14 +25,14 @@ from roadeval.training.learning import fit
 
 SOURCE: Final = "https://github.com/Siya26/Semantic-Segmentation-on-IDD_Lite"
 DRAWS: Final = 1000
-"""Of the bootstrap over drives."""
+"""Draws of the bootstrap over drives."""
 SEEDS_OF_ROBUST: Final = 3
 """Its trainings take longer."""
 FEWER_PIXELS: Final = 20_000
-"""That each of many trainings learns from; `robust` takes more."""
+"""Pixels of each of many trainings; `robust` takes more."""
 VARIANTS: Final = ("unfiltered", "paper", "gated", "robust")
 FILTER_ALONE: Final = ("gated", "similarity", "svm", "post")
-"""The chain of the preset `gated` without exposure, as it was measured here."""
+"""The chain of the preset `gated` without exposure, as measured here."""
 UNLABELLED: Final = "unlabelled"
 """`robust` taught by the reference patch, without any label."""
 TP, TN, FP, FN, DARK, DARK_MISSED = range(6)
@@ -41,10 +41,10 @@ Counted = NDArray[np.int64]
 """Outcomes of a variant on each drive, ``(drives, 6)``."""
 Drives = Mapping[str, Sequence[Frame]]
 Fold = tuple[Drives, Drives]
-"""The drives that learn, and those that are scored."""
+"""The drives that train, and the drives that are scored."""
 
 
-def measured(folder: Path, seeds: int) -> dict[str, Any]:
+def measure(folder: Path, seeds: int) -> dict[str, Any]:
     """Run both folds with each seed; rates are pooled over all pixels, as fractions.
 
     Parameters
@@ -52,7 +52,7 @@ def measured(folder: Path, seeds: int) -> dict[str, Any]:
     folder
         ``idd20k_lite`` as downloaded.
     seeds
-        Of the training: 0 and those after it.
+        Number of seeds of the training, from 0.
     """
     folds = both_ways(folder)
     blind = np.concatenate([count_blind(*fold) for fold in folds])
@@ -64,26 +64,26 @@ def measured(folder: Path, seeds: int) -> dict[str, Any]:
         "drives": len(blind),
         "labelled": int(blind[:, :DARK].any(axis=1).sum()),
         "blind": {"ERR": err(blind.sum(axis=0)), "dark_missed": missed(blind.sum(axis=0))},
-        "variants": {name: told(found, blind, trained) for name, found in trained.items()},
+        "variants": {name: rates_of(by_seed, blind, trained) for name, by_seed in trained.items()},
     }
 
 
 def without_each_group(folder: Path) -> dict[str, Any]:
     """Return ERR of `robust`, and its change without each group of its features.
 
-    With a `reach_weight` of 0; with one seed and `FEWER_PIXELS`.
-    Half of the drives learn, the others are scored.
+    `reach_weight` is 0; there is one seed, and `FEWER_PIXELS`. Half of the drives train, the others
+    are scored.
     """
     folds = both_ways(folder)[:1]
-    groups = {name: tuple(each for each in GROUPS if each != name) for name in GROUPS}
-    found = {
-        name: with_each_seed(_robust_with(kept), 1, folds)[0]
-        for name, kept in {"all": tuple(GROUPS), **groups}.items()
+    groups = {name: tuple(group for group in GROUPS if group != name) for name in GROUPS}
+    counted = {
+        name: with_each_seed(_robust_with(names), 1, folds)[0]
+        for name, names in {"all": tuple(GROUPS), **groups}.items()
     }
-    base = found.pop("all")
+    base = counted.pop("all")
     without = {
-        name: {"dark_missed": missed(each.sum(axis=0)), **difference(err, each, base)}
-        for name, each in found.items()
+        name: {"dark_missed": missed(part.sum(axis=0)), **difference(err, part, base)}
+        for name, part in counted.items()
     }
     return {
         "ERR": err(base.sum(axis=0)),
@@ -99,7 +99,7 @@ def _robust_with(groups: tuple[str, ...]) -> RunConfig:
 
 
 def both_ways(folder: Path) -> tuple[Fold, Fold]:
-    """Cut the drives in two halves; return each as what learns, and the other as what is scored."""
+    """Cut the drives in two halves; return each half to train with the other half to score."""
     halves: tuple[dict[str, list[Frame]], dict[str, list[Frame]]] = {}, {}
     for name, frames in read_drives(folder).items():
         halves[blake2b(name.encode()).digest()[0] % 2][name] = frames
@@ -111,22 +111,22 @@ def with_each_seed(config: RunConfig, seeds: int, folds: Sequence[Fold]) -> list
     return [np.concatenate([score(config, seed, *fold) for fold in folds]) for seed in range(seeds)]
 
 
-def told(
-    found: list[Counted], blind: Counted, trained: Mapping[str, list[Counted]]
+def rates_of(
+    by_seed: list[Counted], blind: Counted, trained: Mapping[str, list[Counted]]
 ) -> dict[str, Any]:
-    """Return a variant's rates with each seed, and its differences with intervals of the first."""
+    """Return a variant's rates with each seed, and the first one's differences with intervals."""
     base = trained["unfiltered"]
     numbers: dict[str, Any] = {
-        "ERR": [err(each.sum(axis=0)) for each in found],
-        "dark_missed": [missed(each.sum(axis=0)) for each in found],
-        "not_below_blind": [not_below(each, blind) for each in found],
-        "against_blind": difference(err, found[0], blind),
+        "ERR": [err(counted.sum(axis=0)) for counted in by_seed],
+        "dark_missed": [missed(counted.sum(axis=0)) for counted in by_seed],
+        "not_below_blind": [not_below(counted, blind) for counted in by_seed],
+        "against_blind": difference(err, by_seed[0], blind),
     }
-    if found is not base:
+    if by_seed is not base:
         numbers["against_unfiltered"] = {
-            **difference(err, found[0], base[0]),
+            **difference(err, by_seed[0], base[0]),
             "seeds": [
-                err(a.sum(axis=0)) - err(b.sum(axis=0)) for a, b in zip(found, base, strict=False)
+                err(a.sum(axis=0)) - err(b.sum(axis=0)) for a, b in zip(by_seed, base, strict=False)
             ],
         }
     return numbers
@@ -150,7 +150,7 @@ def read(path: Path, folder: Path) -> Frame:
 
 
 def dark_road(frame: Frame) -> NDArray[np.bool_]:
-    """Road darker than half of the 85th percentile of the frame's road."""
+    """Return the road darker than half of the 85th percentile of the frame's road."""
     grey, road = frame.image.mean(axis=2), frame.truth == ROAD
     return road & (grey < 0.5 * np.percentile(grey[road], 85)) if road.any() else road
 
@@ -158,13 +158,13 @@ def dark_road(frame: Frame) -> NDArray[np.bool_]:
 def counts(mask: NDArray[np.uint8], frame: Frame) -> NDArray[np.int64]:
     """Count a mask's outcomes on a frame, and on its dark road."""
     road, other, dark = frame.truth == ROAD, frame.truth == NON_ROAD, dark_road(frame)
-    found = mask > 0
-    sets = [road & found, other & ~found, other & found, road & ~found, dark, dark & ~found]
+    called = mask > 0
+    sets = [road & called, other & ~called, other & called, road & ~called, dark, dark & ~called]
     return np.array([part.sum() for part in sets])
 
 
 def variants() -> Iterator[tuple[str, RunConfig]]:
-    """Yield what is compared: colours without a filter, and presets."""
+    """Yield the variants to compare: colours without a filter, and presets."""
     paper = configure()
     yield VARIANTS[0], replace(paper, pipeline=paper.pipeline.without_filter())
     yield "paper", paper
@@ -208,7 +208,7 @@ def missed(total: Counted) -> float:
 
 
 def not_below(rows: Counted, blind: Counted) -> int:
-    """Return on how many of the drives that have an ERR it is not below that of ``blind``."""
+    """Return the number of labelled drives with an ERR that is not below that of ``blind``."""
     labelled = blind[:, :DARK].any(axis=1)
     return int((err(rows[labelled]) >= err(blind[labelled])).sum())
 

@@ -1,6 +1,6 @@
-"""What the shadow filters do on drives that nothing was trained on.
+"""The effects of the shadow filters on drives that nothing was trained on.
 
-A filter is judged by ERR and by dark road missed together, and by what it does to frames without
+A filter is judged by ERR and by dark road missed together, and by its effect on frames without
 dark road.
 """
 
@@ -38,25 +38,27 @@ Frames = NDArray[np.int64]
 stand for a frame that a drive does not have."""
 
 
-def measured(folder: Path) -> dict[str, Any]:
+def measure(folder: Path) -> dict[str, Any]:
     """Measure the filter with each factor of its odds before each classifier.
 
     Rates are pooled over pixels, as fractions; differences are of the filtered and the unfiltered
     chain of the same seed.
     """
     folds = idd.both_ways(folder)
-    found: dict[str, Any] = {"seeds": SEEDS}
+    results: dict[str, Any] = {"seeds": SEEDS}
     for name, tables in CHAINS.items():
         base = [_outcomes(_unfiltered(tables), seed, folds) for seed in range(SEEDS)]
         flat = _flat(base[0])
-        rates = [_rates(each, flat) for each in base]
-        found[name] = {"none": {key: [each[key] for each in rates] for key in rates[0]}}
+        rates = [_rates(frames, flat) for frames in base]
+        results[name] = {"none": {key: [seed[key] for seed in rates] for key in rates[0]}}
         for odds in ODDS:
             config = configure({**tables, "gated": {"odds": odds}})
             new = [_outcomes(config, seed, folds) for seed in range(SEEDS)]
-            found[name][f"{odds:g}"] = [_told(a, b, flat) for a, b in zip(new, base, strict=True)]
-        found["flat_frames"] = int(flat.sum())
-    return found
+            results[name][f"{odds:g}"] = [
+                _changes(a, b, flat) for a, b in zip(new, base, strict=True)
+            ]
+        results["flat_frames"] = int(flat.sum())
+    return results
 
 
 def _unfiltered(tables: Mapping[str, Any]) -> RunConfig:
@@ -82,23 +84,23 @@ def _by_frame(
     return rows
 
 
-def _flat(found: Frames) -> NDArray[np.bool_]:
+def _flat(frames: Frames) -> NDArray[np.bool_]:
     """Return which frames have road and next to no dark road."""
-    road = found[..., idd.TP] + found[..., idd.FN]
-    return (road > 0) & (found[..., idd.DARK] < FLAT * road)
+    road = frames[..., idd.TP] + frames[..., idd.FN]
+    return (road > 0) & (frames[..., idd.DARK] < FLAT * road)
 
 
-def _parts(found: Frames, flat: NDArray[np.bool_]) -> tuple[idd.Counted, idd.Counted]:
+def _parts(frames: Frames, flat: NDArray[np.bool_]) -> tuple[idd.Counted, idd.Counted]:
     """Return the outcomes by drive, of all frames and of flat ones."""
-    return found.sum(axis=1), (found * flat[..., None]).sum(axis=1)
+    return frames.sum(axis=1), (frames * flat[..., None]).sum(axis=1)
 
 
-def _rates(found: Frames, flat: NDArray[np.bool_]) -> dict[str, float]:
-    every, some = (part.sum(axis=0) for part in _parts(found, flat))
+def _rates(frames: Frames, flat: NDArray[np.bool_]) -> dict[str, float]:
+    every, some = (part.sum(axis=0) for part in _parts(frames, flat))
     return {"ERR": idd.err(every), "dark_missed": idd.missed(every), "flat_ERR": idd.err(some)}
 
 
-def _told(new: Frames, base: Frames, flat: NDArray[np.bool_]) -> dict[str, Any]:
+def _changes(new: Frames, base: Frames, flat: NDArray[np.bool_]) -> dict[str, Any]:
     pairs = list(zip(_parts(new, flat), _parts(base, flat), strict=True))
     drives = flat.any(axis=1)
     return {

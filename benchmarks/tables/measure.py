@@ -21,7 +21,7 @@ class Replay:
     """A replay of drives."""
 
     tables: Mapping[str, Any]
-    """Its configuration, without what the drive's truth needs."""
+    """Its configuration, without the labels of the drive's truth."""
     options: str = ""
     """The same for the terminal; empty where that takes files, too."""
     seeds: int = SEEDS
@@ -35,13 +35,13 @@ STRANGERS: Final = {
     **{name: DRIVES[name] for name in ("synthetic_0", "camvid_0016E5_15hz")},
     COMMA10K.name: COMMA10K,
 }
-"""Those others: other cameras, and other journeys of the same one."""
+"""Drives of other cameras, and of other journeys of the same one."""
 
 DEVELOPED: Final = tuple(
     name for name, drive in DRIVES.items() if drive.tuned or name.startswith("synthetic")
 )
-"""Those that `gated` was replayed on since it learns its gate, and `robust` since it has boosted
-trees: the others are kept for an examination that nobody tunes for."""
+"""Drives that `gated` was replayed on since it learns its gate, and `robust` since it has boosted
+trees: the others are for an examination that nobody tunes for."""
 
 REPLAYS: Final[Mapping[str, Replay]] = {
     "paper": Replay(
@@ -72,8 +72,8 @@ def command(replay: str) -> str:
     return f"roadeval replay DRIVE {REPLAYS[replay].options}"
 
 
-def replayed(replay: str, drive: Drive, sources: Sources) -> dict[str, Any]:
-    """Replay a drive with each seed of the training; return what is kept of the summaries."""
+def replay_seeds(replay: str, drive: Drive, sources: Sources) -> dict[str, Any]:
+    """Replay a drive with each seed of the training; return the numbers of the summaries."""
     tables = dict(REPLAYS[replay].tables)
     tables |= {"labels": drive.labels, "output": {"record": "none"}}
     summaries = []
@@ -83,77 +83,77 @@ def replayed(replay: str, drive: Drive, sources: Sources) -> dict[str, Any]:
         reports = sources.work / f"{drive.name}.{replay}.{seed}"
         path = drive.find(sources, drive.name)
         summaries.append(roadeval.replay(path, config, reports=reports).summary)
-    return kept(summaries)
+    return numbers_of(summaries)
 
 
-def of_others(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what is kept of summaries with models of other drives, one for each seed."""
-    first = found[0]
+def of_others(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the numbers of summaries with models of other drives, one for each seed."""
+    first = summaries[0]
     (variant,) = first["against_blind"]
     return {
-        "ERR": [rounded(each["totals"][variant][FINAL_STAGE]["ERR"]) for each in found],
-        "blind": rounded(first["totals"]["blind"][FINAL_STAGE]["ERR"]),
+        "ERR": [round_all(summary["totals"][variant][FINAL_STAGE]["ERR"]) for summary in summaries],
+        "blind": round_all(first["totals"]["blind"][FINAL_STAGE]["ERR"]),
         "against_blind": change_of(first["against_blind"][variant]["ERR"]),
     }
 
 
-def kept(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def numbers_of(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the numbers that tables show, of the summaries with the seeds from 0.
 
-    All are of the final mask, as fractions; but for the rates of each seed, of the first one.
+    All are fractions for the final mask of the first seed, except the rates of each seed.
     """
     summary = summaries[0]
     variants = {
         variant: {
             **{
-                rate: rounded([each["totals"][variant][FINAL_STAGE][rate] for each in summaries])
+                rate: round_all([s["totals"][variant][FINAL_STAGE][rate] for s in summaries])
                 for rate in RATES
             },
-            "flicker": rounded(summary["beyond"][variant]["flicker"]),
+            "flicker": round_all(summary["beyond"][variant]["flicker"]),
         }
         for variant in summary["totals"]
         if variant != BASELINE
     }
-    found: dict[str, Any] = {
+    results: dict[str, Any] = {
         "frames": summary["frames"]["evaluated"],
         "seeds": [*range(len(summaries))],
         "variants": variants,
-        "blind": {rate: rounded(summary["totals"]["blind"][FINAL_STAGE][rate]) for rate in RATES},
+        "blind": {rate: round_all(summary["totals"]["blind"][FINAL_STAGE][rate]) for rate in RATES},
         "against_blind": {
             variant: change_of(rates["ERR"]) for variant, rates in summary["against_blind"].items()
         },
         "claims": summary["claims"],
-        "truth_flicker": rounded(summary["beyond"][next(iter(variants))]["truth_flicker"]),
+        "truth_flicker": round_all(summary["beyond"][next(iter(variants))]["truth_flicker"]),
     }
     perfect = summary.get("oracles", {}).get(FILTERED, {}).get("shadow", {})
     if perfect:
-        found["perfect_shadow"] = {
-            "perfect": rounded(perfect[FINAL_STAGE]["ERR"]),
+        results["perfect_shadow"] = {
+            "perfect": round_all(perfect[FINAL_STAGE]["ERR"]),
             **{
-                name: rounded(summary["totals"][name][FINAL_STAGE]["ERR"])
+                name: round_all(summary["totals"][name][FINAL_STAGE]["ERR"])
                 for name in (FILTERED, UNFILTERED)
             },
         }
-    if own := summary["difference"].get(FINAL_STAGE):
-        found["filter"] = {
+    if changes := summary["difference"].get(FINAL_STAGE):
+        results["filter"] = {
             rate: {
-                **change_of(own[rate]),
-                "seeds": rounded([e["difference"][FINAL_STAGE][rate]["mean"] for e in summaries]),
+                **change_of(changes[rate]),
+                "seeds": round_all([e["difference"][FINAL_STAGE][rate]["mean"] for e in summaries]),
             }
             for rate in RATES
         }
-    return found
+    return results
 
 
 def change_of(change: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is kept of a paired difference."""
-    return {name: rounded(change[name]) for name in KEPT}
+    """Return the numbers of a paired difference."""
+    return {name: round_all(change[name]) for name in KEPT}
 
 
-def rounded(value: Any) -> Any:
-    """Round what is kept to six digits; tables show less."""
+def round_all(value: Any) -> Any:
+    """Round numbers to six digits; tables show less."""
     if isinstance(value, dict):
-        return {key: rounded(each) for key, each in value.items()}
+        return {key: round_all(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [rounded(each) for each in value]
+        return [round_all(inner) for inner in value]
     return float(f"{value:.6g}") if isinstance(value, float) else value

@@ -38,7 +38,7 @@ READ: Final = (
     "cityscapesScripts 2.3.0, mmsegmentation 1.2.2, torchmetrics 1.9.0, FiftyOne 1.22.1 and "
     "Ultralytics 8.4.190"
 )
-"""Whose source was read for `Overlap.reported_by`; KITTI's is its devkit of 2013."""
+"""Sources that were read for `Overlap.reported_by`; KITTI's is its devkit of 2013."""
 Array = NDArray[Any]
 
 
@@ -59,17 +59,17 @@ class Pixels(NamedTuple):
 
 
 class Overlap(NamedTuple):
-    """An overlap number: what it is called, whose it is, and a library's way to compute it."""
+    """An overlap number: its name, its source, and a library's way to compute it."""
 
     name: str
     stands: str
-    """Where roadeval shows it."""
+    """Place where roadeval shows it."""
     definition: str
     reported_by: str
     library: str
     again: Callable[[Pixels], float]
     key: str
-    """Of `printed`."""
+    """Its name in the result of `_printed`."""
 
 
 def _flat(images: list[Array]) -> Array:
@@ -77,12 +77,12 @@ def _flat(images: list[Array]) -> Array:
 
 
 def _all_pixels(score: Callable[..., Any], **options: Any) -> Callable[[Pixels], float]:
-    return lambda own: float(score(_flat(own.truth), _flat(own.mask), **options))
+    return lambda pixels: float(score(_flat(pixels.truth), _flat(pixels.mask), **options))
 
 
 def _mean_of_frames(score: Callable[..., Any], **options: Any) -> Callable[[Pixels], float]:
-    def again(own: Pixels) -> float:
-        pairs = zip(own.truth, own.mask, strict=True)
+    def again(pixels: Pixels) -> float:
+        pairs = zip(pixels.truth, pixels.mask, strict=True)
         return float(np.mean([score(t.ravel(), m.ravel(), **options) for t, m in pairs]))
 
     return again
@@ -99,14 +99,14 @@ def _max_f(truth: Array, level: Array) -> float:
     return float(np.max(2 * precision * recall / (precision + recall)))
 
 
-def _eleven_recalls(own: Pixels) -> float:
-    precision, recall = _curve(own.from_above(own.truth), _levels(own))
+def _eleven_recalls(pixels: Pixels) -> float:
+    precision, recall = _curve(pixels.from_above(pixels.truth), _levels(pixels))
     reached = (precision[recall >= tenth / 10] for tenth in range(11))
     return float(np.mean([part.max() if len(part) else 0 for part in reached]))
 
 
-def _levels(own: Pixels) -> Array:
-    return own.from_above(own.code) // 257  # the greatest k for which k / 255 is reached
+def _levels(pixels: Pixels) -> Array:
+    return pixels.from_above(pixels.code) // 257  # the greatest k for which k / 255 is reached
 
 
 def _boundary_iou(truth: Array, mask: Array) -> float:
@@ -130,7 +130,7 @@ def _boundary_f(truth: Array, mask: Array) -> float:
 
 
 def _over_frames(score: Callable[[Array, Array], float]) -> Callable[[Pixels], float]:
-    return lambda own: float(np.mean([*map(score, own.truth, own.mask)]))
+    return lambda pixels: float(np.mean([*map(score, pixels.truth, pixels.mask)]))
 
 
 NUMBERS: Final = (
@@ -236,7 +236,7 @@ NUMBERS: Final = (
         "the greatest F1 of all thresholds on the probability, of all pixels together",
         "none of them: KITTI's is of the ground seen from above",
         "scikit-learn `precision_recall_curve`",
-        lambda own: _max_f(_flat(own.truth), _flat(own.code)),
+        lambda pixels: _max_f(_flat(pixels.truth), _flat(pixels.code)),
         "curve_MaxF",
     ),
     Overlap(
@@ -246,7 +246,7 @@ NUMBERS: Final = (
         "scikit-learn, torchmetrics `BinaryAveragePrecision`; the AP of COCO, FiftyOne and "
         "Ultralytics is of objects, and no number here",
         "`average_precision_score`",
-        lambda own: float(average_precision_score(_flat(own.truth), _flat(own.code))),
+        lambda pixels: float(average_precision_score(_flat(pixels.truth), _flat(pixels.code))),
         "curve_AP",
     ),
     Overlap(
@@ -255,7 +255,7 @@ NUMBERS: Final = (
         "the greatest F1 of 256 thresholds, of all cells of 5 cm of ground of all frames",
         "KITTI's road benchmark (`MaxF`)",
         "`precision_recall_curve` of cells",
-        lambda own: _max_f(own.from_above(own.truth), _levels(own)),
+        lambda pixels: _max_f(pixels.from_above(pixels.truth), _levels(pixels)),
         "MaxF",
     ),
     Overlap(
@@ -273,7 +273,7 @@ NUMBERS: Final = (
         "F1 of all cells of a mask without probabilities",
         "KITTI's road benchmark, of a mask alone (`MaxF`)",
         "`f1_score` of cells",
-        lambda own: float(f1_score(own.from_above(own.truth), own.from_above(own.blind))),
+        lambda pixels: float(f1_score(*map(pixels.from_above, (pixels.truth, pixels.blind)))),
         "blind_F1",
     ),
 )
@@ -283,12 +283,12 @@ class DifferentNumberError(Exception):
     """A library computes another value than roadeval."""
 
 
-def measured() -> dict[str, Any]:
+def measure() -> dict[str, Any]:
     """Return each number of the whole drive by its name, as `compared` does."""
-    return compared(*replayed())
+    return compare_libraries(*replay_demo())
 
 
-def replayed(**more: Mapping[str, Any]) -> tuple[int, dict[str, float], Pixels]:
+def replay_demo(**more: Mapping[str, Any]) -> tuple[int, dict[str, float], Pixels]:
     """Return how many frames were evaluated, roadeval's numbers of them, and their pixels.
 
     All frames of the demo drive are read unless ``more`` tables of the configuration say otherwise.
@@ -305,18 +305,20 @@ def replayed(**more: Mapping[str, Any]) -> tuple[int, dict[str, float], Pixels]:
     return outcome.summary["frames"]["evaluated"], ours, pixels
 
 
-def compared(evaluated: int, ours: Mapping[str, float], pixels: Pixels) -> dict[str, Any]:
+def compare_libraries(evaluated: int, ours: Mapping[str, float], pixels: Pixels) -> dict[str, Any]:
     """Return each number by its name: ``roadeval``'s value, and the ``library``'s.
 
-    A `DifferentNumberError` where the two are not equal.
+    A `DifferentNumberError` if the two are not equal.
     """
-    found = {}
+    values = {}
     for number in NUMBERS:
-        own, other = ours[number.key], number.again(pixels)
-        if not abs(own - other) <= CLOSE:
-            raise DifferentNumberError(f"{number.name}: {own} by roadeval, {other} by a library")
-        found[number.name] = {"roadeval": own, "library": other}
-    return {"evaluated": evaluated, "values": found}
+        printed, other = ours[number.key], number.again(pixels)
+        if not abs(printed - other) <= CLOSE:
+            raise DifferentNumberError(
+                f"{number.name}: {printed} by roadeval, {other} by a library"
+            )
+        values[number.name] = {"roadeval": printed, "library": other}
+    return {"evaluated": evaluated, "values": values}
 
 
 def _printed(summary: dict[str, Any], metres: pd.DataFrame) -> Iterator[tuple[str, float]]:
@@ -348,12 +350,12 @@ def _pixels(recording: roadeval.Recording, config: RunConfig) -> Pixels:
     assert ground is not None
     assert model.prior is not None
     cells = plan_of(ground, config.evaluation).cells.ravel()
-    own = Pixels(truth, [], [], [], cells[cells >= 0])
+    pixels = Pixels(truth, [], [], [], cells[cells >= 0])
     for number in evaluated:
-        found = roadeval.run_frame(recording.image(number), model, config, variant=UNFILTERED)
-        (code,) = (each.output.probability for each in found.stages if each.stage == STAGE)
+        result = roadeval.run_frame(recording.image(number), model, config, variant=UNFILTERED)
+        (code,) = (step.output.probability for step in result.stages if step.stage == STAGE)
         assert code is not None
-        own.mask.append(recording.layer(UNFILTERED, FINAL_STAGE, number))
-        own.code.append(code)
-        own.blind.append((model.prior >= 0.5).astype(np.uint8))
-    return own
+        pixels.mask.append(recording.layer(UNFILTERED, FINAL_STAGE, number))
+        pixels.code.append(code)
+        pixels.blind.append((model.prior >= 0.5).astype(np.uint8))
+    return pixels

@@ -19,11 +19,11 @@ from roadeval.data import FINAL_STAGE
 from roadeval.training.learning import fit
 
 WEIGHTS: Final = (0.0, 0.5, 1.0, 2.0, 4.0)
-"""Of `TreesSettings.reach_weight`."""
+"""Values of `TreesSettings.reach_weight`."""
 OWN: Final = "own"
-"""In the place of a teacher: the drive's own first frames."""
+"""Name of a drive's own first frames as its teacher."""
 HALF: Final = "half"
-"""Likewise: one half of IDD's drives, where the other is scored."""
+"""Name of one half of IDD's drives as the teacher of the other half."""
 PAIRS: Final = (
     (OWN, "camvid_0016E5_15hz"),
     (OWN, "camvid_0006R0_1hz"),
@@ -36,34 +36,35 @@ PAIRS: Final = (
 """Who teaches, and which drive is scored."""
 
 
-def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
-    """Return ERR with each of `WEIGHTS`, on IDD's other half dark road missed besides."""
+def measure(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
+    """Return ERR with each of `WEIGHTS`, and on IDD's other half also the missed dark road."""
     rows = [{"teacher": HALF, "pupil": IDD_LITE, **_on_idd(idd_lite)}]
     for teacher, pupil in PAIRS:
-        own = teacher == OWN
-        training = {} if own else {"model": str(model_of(teacher, 0, sources, idd_lite))}
-        each = [{"training": training, "trees": {"reach_weight": weight}} for weight in WEIGHTS]
-        found = [summary(DRIVES[pupil], tables, sources) for tables in each]
-        (variant,) = found[0]["against_blind"]
-        rates = [one["totals"][variant][FINAL_STAGE]["ERR"] for one in found]
+        training = {} if teacher == OWN else {"model": str(model_of(teacher, 0, sources, idd_lite))}
+        runs = [{"training": training, "trees": {"reach_weight": weight}} for weight in WEIGHTS]
+        summaries = [summary(DRIVES[pupil], tables, sources) for tables in runs]
+        (variant,) = summaries[0]["against_blind"]
+        rates = [one["totals"][variant][FINAL_STAGE]["ERR"] for one in summaries]
         rows.append({"teacher": teacher, "pupil": pupil, "ERR": rates})
     return rows
 
 
 def _on_idd(folder: Path) -> dict[str, list[float]]:
-    """Return rates with each weight on one half of IDD's drives, of trees that the other taught."""
+    """Return rates with each weight on a half of IDD's drives, by trees of the other half."""
     train, test = idd.both_ways(folder)[0]
     config = _robust(WEIGHTS[0])
     frames = [frame for drive in train.values() for frame in drive]
     learnt = fit(frames, {"it": config.pipeline}, config.training).parameters["it"]
     chains = [_robust(weight).pipeline.bind(learnt) for weight in WEIGHTS]
     counted = [
-        np.sum([idd.counts(idd.last(chain, f), f) for each in test.values() for f in each], axis=0)
+        np.sum(
+            [idd.counts(idd.last(chain, f), f) for drive in test.values() for f in drive], axis=0
+        )
         for chain in chains
     ]
     return {
-        "ERR": [float(idd.err(each)) for each in counted],
-        "dark_missed": [float(idd.missed(each)) for each in counted],
+        "ERR": [float(idd.err(total)) for total in counted],
+        "dark_missed": [float(idd.missed(total)) for total in counted],
     }
 
 

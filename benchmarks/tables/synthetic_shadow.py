@@ -22,17 +22,17 @@ PRESETS: Final = {"paper": "shadow", "gated": "gated"}
 """Presets, and the stage that is their filter."""
 
 
-def measured() -> dict[str, Any]:
+def measure() -> dict[str, Any]:
     """Return precision and recall of each filter on each drive, pooled over its frames."""
-    found: dict[str, Any] = {}
+    by_preset: dict[str, Any] = {}
     for seed in SEEDS:
         drive = list(render_drive(RenderSettings(seed=seed)))
         for preset, stage in PRESETS.items():
-            found.setdefault(preset, {})[f"synthetic_{seed}"] = found_on(drive, preset, stage)
-    return found
+            by_preset.setdefault(preset, {})[f"synthetic_{seed}"] = rates_on(drive, preset, stage)
+    return by_preset
 
 
-def found_on(drive: list[SynthFrame], preset: str, stage: str) -> dict[str, float]:
+def rates_on(drive: list[SynthFrame], preset: str, stage: str) -> dict[str, float]:
     """Return precision and recall of a filter's shadow; recall on road and on all of it."""
     config = configure({"preset": preset})
     frames = [Frame(0, 0, 0, f.image, b"", truth=f.road) for f in drive[:TRAINING]]
@@ -44,10 +44,10 @@ def found_on(drive: list[SynthFrame], preset: str, stage: str) -> dict[str, floa
         shadow = output.regions["shadow"].pixels() > 0
         true, road = frame.shadow > 0, frame.road == ROAD
         sets = (shadow & true, shadow, true, shadow & true & road, true & road)
-        totals += [each.sum() for each in sets]
-    both, said, true_count, on_road, road_count = totals
+        totals += [part.sum() for part in sets]
+    both, called, true_count, on_road, road_count = totals
     return {
-        "precision": both / max(said, 1),
+        "precision": both / max(called, 1),
         "recall": both / max(true_count, 1),
         "recall_on_road": on_road / max(road_count, 1),
     }

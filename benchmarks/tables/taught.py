@@ -23,11 +23,11 @@ PUPILS: Final[tuple[tuple[str, str, str | None], ...]] = (
     (IDD_LITE, "camvid_0016E5_15hz", "patch"),
     (IDD_LITE, "camvid_0006R0_1hz", "patch"),
 )
-"""Who teaches, which drive is scored, and by what it is adapted to its first ten frames."""
+"""Training drive, scored drive, and the labels that adapt the model to its first ten frames."""
 
 
-def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
-    """Return what each of `PUPILS` comes to, with each seed; the models are made once."""
+def measure(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
+    """Return the rates of each of `PUPILS` with each seed; the models are made once."""
     rows = []
     for teacher, pupil, adapt in PUPILS:
         outcomes = []
@@ -55,7 +55,7 @@ def trained_elsewhere(drive: Drive, sources: Sources) -> dict[str, Any]:
 def model_of(teacher: str, seed: int, sources: Sources, idd_lite: Path | None = None) -> Path:
     """Return the model of a log's frames as `roadeval train` draws them, or of IDD's train part.
 
-    Made where it is not there yet.
+    It is made if it does not exist yet.
     """
     path = sources.work / f"{teacher}.{seed}.model"
     if path.exists():
@@ -74,8 +74,8 @@ def model_of(teacher: str, seed: int, sources: Sources, idd_lite: Path | None = 
 
 def summary(drive: Drive, tables: Mapping[str, Any], sources: Sources) -> dict[str, Any]:
     """Replay a drive with `robust` and some more settings; return its summary."""
-    given = {"preset": "robust", "labels": drive.labels, "output": {"record": "none"}, **tables}
+    settings = {"preset": "robust", "labels": drive.labels, "output": {"record": "none"}, **tables}
     reports = sources.work / f"{drive.name}.taught"
     return roadeval.replay(
-        drive.find(sources, drive.name), roadeval.configure(given), reports=reports
+        drive.find(sources, drive.name), roadeval.configure(settings), reports=reports
     ).summary

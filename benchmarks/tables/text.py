@@ -1,4 +1,4 @@
-"""The tables in the texts: between marks, made of the numbers, and held against them."""
+"""The tables in the texts: between marks, made of the numbers, and compared with them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CODE: Final = re.compile(r"^```.*?^```$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 _MEASURED: Final = re.compile(
     r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?\s?(?:%|pp\b|points?\b|ms\b|[kMG]i?B\b)|\d+\.\d+"
 )
-"""A number with a unit of what is measured here, or one with decimals."""
+"""A number with decimals, or with a unit of these measurements."""
 NOT_MEASURED: Final = (
     "Python 3.11",
     "95 % interval",
@@ -37,7 +37,7 @@ NOT_MEASURED: Final = (
     "| 4.2, step 5",
     "| 4.4, order",
 )
-"""What looks like a measured number in the texts and is none."""
+"""Texts that look like a measured number and are none."""
 
 
 def load() -> dict[str, Any]:
@@ -47,7 +47,7 @@ def load() -> dict[str, Any]:
 
 
 def written(text: str, numbers: Mapping[str, Any]) -> str:
-    """Return a text with every table between marks made anew; unknown names stay as they are."""
+    """Return a text with every table between marks made anew; unknown names stay unchanged."""
 
     def anew(match: re.Match[str]) -> str:
         block = BLOCKS.get(match["name"])
@@ -65,12 +65,12 @@ def between_marks(name: str, numbers: Mapping[str, Any]) -> str:
 
 
 def faults(text: str, numbers: Mapping[str, Any]) -> Iterator[str]:
-    """Yield, a line each, where a text says something else than the numbers, or without them."""
+    """Yield, a line each, the places where a text differs from the numbers, or has none."""
     marks = text.count("<!-- table ")
-    found = [*_BLOCK.finditer(text)]
-    if marks != len(found):
-        yield f"{marks} tables begin, and {len(found)} are whole: each ends with a line {END}"
-    for match in found:
+    blocks = [*_BLOCK.finditer(text)]
+    if marks != len(blocks):
+        yield f"{marks} tables begin, and {len(blocks)} are whole: each ends with a line {END}"
+    for match in blocks:
         if match["name"] not in BLOCKS:
             yield f"table {match['name']}: unknown, one of {', '.join(BLOCKS)}"
         elif match[0] != between_marks(match["name"], numbers):
@@ -80,9 +80,9 @@ def faults(text: str, numbers: Mapping[str, Any]) -> Iterator[str]:
 
 
 def loose(text: str) -> list[str]:
-    """Return what looks like measured numbers outside tables between marks and outside code."""
+    """Return texts like measured numbers outside tables between marks and outside code."""
     for part in (_BLOCK, _CODE):
         text = part.sub("", text)
-    for known in NOT_MEASURED:
-        text = text.replace(known, "")
+    for phrase in NOT_MEASURED:
+        text = text.replace(phrase, "")
     return [match[0] for match in _MEASURED.finditer(text)]

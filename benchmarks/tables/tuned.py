@@ -1,7 +1,7 @@
 """A network as it comes, with the threshold of labelled frames, and tuned on them, beside `robust`.
 
 The network is any that was trained elsewhere, by its ONNX file. A log's first ten frames teach, and
-each half of IDD's drives teaches what the other is scored with.
+each half of IDD's drives teaches the model of the other half.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ import roadeval
 from benchmarks.tables import idd
 from benchmarks.tables.drives import DRIVES, MissingSourceError, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST
-from benchmarks.tables.measure import DEVELOPED, change_of, rounded
+from benchmarks.tables.measure import DEVELOPED, change_of, round_all
 from roadeval.config.run import RunConfig
 from roadeval.config.variants import network_variant
 from roadeval.data import FINAL_STAGE
 
 NAMES: Final = {"robust": "unfiltered", "network": "net", "threshold": "at", "tuned": "net_tuned"}
-"""What is compared, and its variant."""
+"""The compared methods, and their variants."""
 
 
-def measured(sources: Sources, network: Path) -> dict[str, Any]:
+def measure(sources: Sources, network: Path) -> dict[str, Any]:
     """Return ERR of each of `NAMES` on each drive and on IDD, with three seeds, as fractions."""
     if sources.idd is None:
         raise MissingSourceError(f"tuned: name the folder of {idd.SOURCE} (--idd)")
@@ -59,14 +59,14 @@ def _config(tables: dict[str, Any], sources: Sources, network: Path) -> RunConfi
 
 
 def _on_idd(folder: Path, sources: Sources, network: Path) -> dict[str, Any]:
-    """Return the same of all pixels together, with intervals of a bootstrap over drives."""
+    """Return ERR over all pixels of IDD together, with intervals of a bootstrap over drives."""
     config, folds = _config({}, sources, network).resolved(), idd.both_ways(folder)
     blind = np.concatenate([idd.count_blind(*fold) for fold in folds])
     counted = {}
     for key, variant in NAMES.items():
-        own = replace(config, pipeline=config.pipelines()[variant])
+        alone = replace(config, pipeline=config.pipelines()[variant])
         seeds = 1 if key in ("network", "threshold") else SEEDS_OF_ROBUST
-        counted[key] = idd.with_each_seed(own, seeds, folds)
+        counted[key] = idd.with_each_seed(alone, seeds, folds)
     return told_of_idd(blind, counted)
 
 
@@ -77,31 +77,34 @@ def told_of_idd(blind: idd.Counted, counted: Mapping[str, list[idd.Counted]]) ->
         "blind": idd.err(blind.sum(axis=0)),
         "change": idd.difference(idd.err, tuned, robust),
         "against_network": idd.difference(idd.err, tuned, network),
-        **{key: [idd.err(each.sum(axis=0)) for each in seeds] for key, seeds in counted.items()},
+        **{
+            key: [idd.err(drives.sum(axis=0)) for drives in seeds] for key, seeds in counted.items()
+        },
     }
 
 
 def of_summaries(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what is kept of the summaries of replays, one a seed of the training from 0.
+    """Return the numbers of the summaries of replays, one a seed of the training from 0.
 
-    The network as it comes learns nothing: its ERR is there once.
+    The unchanged network learns nothing: its ERR is there once.
     """
     summary = summaries[0]
     totals = summary["totals"]
     errors = {
         key: [
-            each["totals"][variant][FINAL_STAGE]["ERR"]
-            for each in (summaries[:1] if key == "network" else summaries)
+            seed["totals"][variant][FINAL_STAGE]["ERR"]
+            for seed in (summaries[:1] if key == "network" else summaries)
         ]
         for key, variant in NAMES.items()
     }
-    found: dict[str, Any] = {
-        "blind": totals["blind"][FINAL_STAGE]["ERR"],
-        "own": summary["thresholds"]["net"]["own"],
-        "chosen": summary["thresholds"]["net"]["threshold"],
-        "change": change_of(summary["against_unfiltered"]["net_tuned"]["ERR"]),
-        "against_network": change_of(summary["against_method"]["net_tuned"]["ERR"]),
-        **errors,
-    }
-    kept: dict[str, Any] = rounded(found)
-    return kept
+    numbers: dict[str, Any] = round_all(
+        {
+            "blind": totals["blind"][FINAL_STAGE]["ERR"],
+            "own": summary["thresholds"]["net"]["own"],
+            "chosen": summary["thresholds"]["net"]["threshold"],
+            "change": change_of(summary["against_unfiltered"]["net_tuned"]["ERR"]),
+            "against_network": change_of(summary["against_method"]["net_tuned"]["ERR"]),
+            **errors,
+        }
+    )
+    return numbers

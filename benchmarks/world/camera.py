@@ -21,7 +21,7 @@ LEAST: Final = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the camera is (metres) and where it looks (radians).
+    """Place of the camera (metres) and its direction (radians).
 
     Positive yaw looks right, positive pitch up, positive roll leans right.
     """
@@ -97,7 +97,7 @@ class Camera:
     def catches(self, corners: Matrix) -> Flags:
         """Return which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
 
-        Left out is what lies behind, to either side, or is too low in the image.
+        Points behind it, to either side, or too low in the image are left out.
         """
         right, _, forward = self.axes
         depth = (corners - self.position) @ forward
@@ -112,12 +112,12 @@ class Camera:
         depth = self.depth(corners)
         if depth.min() >= NEAR:
             return self.project(corners)
-        kept: list[Matrix] = []
+        corners: list[Matrix] = []
         for here, there, d0, d1 in zip(
             corners, np.roll(corners, -1, 0), depth, np.roll(depth, -1), strict=True
         ):
             if d0 >= NEAR:
-                kept.append(here)
+                corners.append(here)
             if (d0 >= NEAR) != (d1 >= NEAR):
-                kept.append(here + (there - here) * (NEAR - d0) / (d1 - d0))
-        return self.project(np.array(kept)) if kept else np.empty((0, 2))
+                corners.append(here + (there - here) * (NEAR - d0) / (d1 - d0))
+        return self.project(np.array(corners)) if corners else np.empty((0, 2))

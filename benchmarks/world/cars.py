@@ -104,7 +104,7 @@ class Car:
     heading
         Of the road there, radians from +Z.
     sunlit
-        Share of the sun's disc that what stands about leaves to it.
+        Share of the sun's disc that the things around leave to it.
     """
 
     look: CarPaint

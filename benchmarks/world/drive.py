@@ -40,7 +40,7 @@ class DriveError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class RenderSettings:
-    """What to render.
+    """Settings of a rendered drive.
 
     Parameters
     ----------

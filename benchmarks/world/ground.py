@@ -1,4 +1,4 @@
-"""What the ground is made of: asphalt with its history, paint, soil and grass.
+"""The materials of the ground: asphalt with its history, paint, soil and grass.
 
 All textures wrap around, so that a drive may be long.
 """

@@ -74,7 +74,7 @@ class House:
             )
 
     def panels(self, shade: SunMap, rng: np.random.Generator) -> tuple[Panel, Panel, Panel]:
-        """Paint what is seen from the road: roof, long wall and gable, in this order."""
+        """Paint the sides seen from the road: roof, long wall and gable, in this order."""
         face = self.low[0] if self.side > 0 else self.high[0]
         middle, eaves = (self.low[0] + self.high[0]) / 2, self.high[1]
         along = np.array([0.0, 0.0, self.high[2] - self.low[2]])
@@ -102,7 +102,7 @@ class House:
 
 
 NOTHING: Final = Picture((), ())
-"""What hangs on a wall before it is painted."""
+"""Things that hang on a wall before it is painted."""
 
 
 def _blank(panel: Panel, colour: Reflectance, texture: Field | float) -> Field:

@@ -49,8 +49,7 @@ class Sway:
 class Journey:
     """A drive of ``duration`` seconds in three equal stretches, the first one moderate.
 
-    No shadow falls while a cloud hides the sun; how much falls otherwise is up to what stands
-    beside the road.
+    No shadow falls while a cloud hides the sun; otherwise the things beside the road cast it.
     """
 
     duration: float

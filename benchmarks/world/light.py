@@ -23,7 +23,7 @@ SUN: Final = np.array([1.26, 1.15, 0.98], np.float32)
 SKY: Final = np.array([0.150, 0.182, 0.235], np.float32)
 """Irradiance of open level ground from the clear sky alone: bluish."""
 CLOUD: Final = np.array([0.215, 0.212, 0.205], np.float32)
-"""What a cloud before the sun adds to the sky's light: nearly grey."""
+"""Light that a cloud before the sun adds to the sky's: nearly grey."""
 THICK: Final = 0.015
 """Share of the direct beam that the cloud lets through."""
 
@@ -54,7 +54,7 @@ class Sun:
         return np.asarray(points[:, [0, 2]] - points[:, 1:2] * towards[[0, 2]] / towards[1])
 
     def facing(self, normal: Matrix) -> float:
-        """Cosine between a surface's normal and the sun, 0 where it faces away."""
+        """Cosine between a surface's normal and the sun, 0 if it faces away."""
         return max(0.0, float(normal @ self.towards))
 
 

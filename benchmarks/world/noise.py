@@ -1,4 +1,4 @@
-"""Random fields that do not depend on where they are looked at: what textures are made of."""
+"""Random fields, the material of textures; they do not depend on the place of the viewer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy import fft
 Field = npt.NDArray[np.floating[Any]]
 """Any array of floats; each use states its shape."""
 Reflectance = tuple[float, float, float]
-"""Of a surface, in red, green and blue: shares of the light."""
+"""Colour of a surface in red, green and blue, as shares of the light."""
 
 
 def coloured_noise(

@@ -1,8 +1,8 @@
 """Flat, partly transparent, textured rectangles in the world: everything that is not ground.
 
-A wall is a panel, and so is a tree: what it looks like from the road, painted once. A panel
-keeps what it returns of the sun's light and of the sky's light apart, so that a cloud changes
-its look without painting it anew.
+A wall is a panel, and so is a tree: its view from the road, painted once. A panel keeps the light
+of the sun and the light of the sky that it returns apart, so that a cloud changes its look without
+painting it anew.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from benchmarks.world.noise import Field
 from roadeval.data.arrays import Matrix
 
 HAZE_LENGTH: Final = 2600.0
-"""Distance at which the air has replaced all but 1/e of what lies behind it, metres."""
+"""Distance at which the air has replaced all but 1/e of the light behind it, metres."""
 
 Window = tuple[int, int, int, int]
 """Columns and rows of an image: left, top, right, bottom, the last two excluded."""
@@ -27,7 +27,7 @@ Window = tuple[int, int, int, int]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """What a panel looks like, at full and at halved resolutions.
+    """The picture of a panel, at full and at halved resolutions.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Film:
-    """What the camera sees, before the sensor; panels are painted over it, far ones first.
+    """The image before the sensor; panels are painted over it, far ones first.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _warped(panel: Panel, camera: Camera, depth: float, window: Window) -> tuple
 
 
 def _inside(outline: Matrix, window: Window) -> Field:
-    """``(h, w, 1)``: 1 inside of an outline; what lies behind the camera would else appear too."""
+    """``(h, w, 1)``: 1 inside of an outline; otherwise parts behind the camera would appear too."""
     left, top, right, bottom = window
     inside = np.zeros((bottom - top, right - left, 1), np.float32)
     cv2.fillConvexPoly(inside, np.round(outline - (left, top)).astype(np.int32), 1.0)

@@ -113,7 +113,7 @@ def light_left(points: Matrix, towards: Matrix, opacity: float) -> Field:
     towards
         ``(3,)`` unit vector to the light.
     opacity
-        Share of the light that a leaf takes from those behind it in the same column.
+        Share of the light that a leaf takes from the leaves behind it in the same column.
 
     Returns
     -------

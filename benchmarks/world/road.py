@@ -83,8 +83,8 @@ def dashed(z: Field, length: Field) -> Field:
     """Share of an interval of ``length`` about ``z`` that dashes cover, along their line."""
 
     def painted_up_to(end: Field) -> Field:
-        whole, rest = np.divmod(end, DASH_PERIOD)
-        return np.asarray(whole * DASH_LENGTH + np.minimum(rest, DASH_LENGTH), end.dtype)
+        dashes, rest = np.divmod(end, DASH_PERIOD)
+        return np.asarray(dashes * DASH_LENGTH + np.minimum(rest, DASH_LENGTH), end.dtype)
 
     painted = painted_up_to(z + length / 2) - painted_up_to(z - length / 2)
     return np.asarray(painted / length, np.float32)

@@ -1,4 +1,4 @@
-"""Which things stand where beside the road: what makes a suburb of a list of plants."""
+"""The places of things beside the road, which make a suburb of a list of plants."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ GRASS_AHEAD: Final = 80.0
 SPECIMENS: Final = 3
 """Plants grown of each species; the same ones stand again and again, in other sizes."""
 LOW: Final = 2.0
-"""What is lower than this gets the sun that the things above it let through, metres."""
+"""Things lower than this get the sun that the things above them let through, metres."""
 SIDES: Final = (-1.0, 1.0)
 """Left and right of the road."""
 
@@ -49,7 +49,7 @@ class Placed:
         self.thing.occlude(silhouettes, self.foot, self.scale)
 
     def panel(self, shade: SunMap) -> Panel:
-        """Return its panel; what is low stands in the shade of what is high."""
+        """Return its panel; low things stand in the shade of high ones."""
         panel = self.thing.panel(self.foot, self.scale)
         height = self.scale * self.thing.height
         if height > LOW:
@@ -58,7 +58,7 @@ class Placed:
         return replace(panel, sunlit=float(shade.visible_from(about[None]).mean()))
 
     def is_in(self, house: House) -> bool:
-        """Whether it would stand in a house, or behind it, where it would hide the wall."""
+        """Return whether it stands in a house, or behind it and hides the wall."""
         x, _, z = self.foot
         beyond = x > house.low[0] - 2.5 if house.side > 0 else x < house.high[0] + 2.5
         return bool(beyond and house.low[2] - 4 < z < house.high[2] + 4)
@@ -66,7 +66,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """What is planted in a row, how densely, how far from the asphalt's edge, and how large."""
+    """A row of plants: species, density, distance from the asphalt's edge, and size."""
 
     kinds: list[Standing]
     spacing: Span
@@ -95,12 +95,12 @@ class Roadside:
 
     @property
     def sunny(self) -> float:
-        """The side of the road that the sun is on: what stands there shades the road."""
+        """The side of the road that the sun is on: things there shade the road."""
         return float(np.sign(self.sun.azimuth))
 
     @property
     def avenue(self) -> Span:
-        """Where large trees line the road: what is ahead during the stretch of heavy shadow.
+        """The part of the road with large trees: the view ahead in the stretch of heavy shadow.
 
         Seen from a stretch in the sun it has to begin later than from one under the cloud.
         """

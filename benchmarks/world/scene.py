@@ -21,7 +21,7 @@ from roadeval.data.arrays import Matrix
 SHADED_AHEAD: Final = 110.0
 """Shadows lie on the ground up to this far beyond the end of the drive, metres."""
 BAY_LENGTH: Final = 42.0
-"""Of the lay-by, its tapers included, metres."""
+"""Length of the lay-by with its tapers, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

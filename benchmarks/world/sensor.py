@@ -76,10 +76,10 @@ class Sensor:
         return np.asarray(self._response[codes])
 
     def _metered(self, radiance: Field) -> float:
-        """Move the exposure towards what the lower two thirds of the scene ask for."""
+        """Move the exposure towards that of the lower two thirds of the scene."""
         metered = radiance[len(radiance) // 3 :: 4, ::4, 1]
-        wanted = MIDDLE / float(np.exp(np.log(metered + 1e-3).mean()))
+        exposure = MIDDLE / float(np.exp(np.log(metered + 1e-3).mean()))
         if self._exposure is None:
-            self._exposure = wanted
-        self._exposure *= (wanted / self._exposure) ** self._pace
+            self._exposure = exposure
+        self._exposure *= (exposure / self._exposure) ** self._pace
         return self._exposure

@@ -1,4 +1,4 @@
-"""Cast shadows: what stands beside the road, projected along its rays.
+"""Cast shadows: the things beside the road, projected along the sun's rays.
 
 Occluders are cut into layers by height. A layer's silhouette, projected along the sun onto the
 ground, is blurred by the sun's disc as it appears from there: the penumbra grows with the way
@@ -62,7 +62,7 @@ def disc_of_the_sun(sun: Sun, height: float) -> Field:
 
 
 class Silhouettes:
-    """Collects what stands between the sun and a stretch of road, layer by layer."""
+    """Collects the things between the sun and a stretch of road, layer by layer."""
 
     def __init__(self, road: Road, sun: Sun, start: float, end: float) -> None:
         self.road, self.sun, self.start = road, sun, start
@@ -166,7 +166,7 @@ class SunMap:
     def hidden_sky(self, ground: GroundTexture) -> GroundTexture:
         """Return the share of the sky hidden from the ground: large where shade is dense.
 
-        An approximation: what hides the sun also hides the sky about it.
+        This is an approximation: a thing before the sun also hides the sky about it.
         """
         coarse = 1.0 - cv2.resize(ground.levels[0], None, fx=1 / 8, fy=1 / 8,
                                   interpolation=cv2.INTER_AREA)  # fmt: skip
@@ -183,9 +183,9 @@ class SunMap:
         column, row = cells.astype(np.float32).T.reshape(2, *points.shape[:2])
         share = np.ones(points.shape[:2], np.float32)
         for layer, bottom in zip(self.layers, HEIGHTS[:-1], strict=True):
-            found = cv2.remap(
+            light = cv2.remap(
                 layer, column, row, cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_CONSTANT, borderValue=255,
             )  # fmt: skip
-            share *= np.where(points[..., 1] <= bottom, found / np.float32(255), 1.0)
+            share *= np.where(points[..., 1] <= bottom, light / np.float32(255), 1.0)
         return share

@@ -13,7 +13,7 @@ from benchmarks.world.noise import Field, coloured_noise, smoothstep
 
 HORIZON: Final = np.array([0.52, 0.58, 0.64], np.float32)
 ZENITH: Final = np.array([0.10, 0.19, 0.40], np.float32)
-"""Radiance of the clear sky; the horizon's is the air's own and tints what is far."""
+"""Radiance of the clear sky; the horizon's is the air's own and tints distant things."""
 CLOUD_TOP: Final = np.array([1.00, 0.99, 0.97], np.float32)
 CLOUD_BASE: Final = np.array([0.50, 0.53, 0.57], np.float32)
 HILLS: Final = np.array([0.20, 0.25, 0.28], np.float32)
@@ -28,7 +28,7 @@ SKYLINE_SHARPNESS: Final = 0.0016
 
 
 def air(beam: float) -> Field:
-    """``(3,)`` radiance of the air between us and what is far, for a share of the sun's beam."""
+    """``(3,)`` radiance of the air before distant things, for a share of the sun's beam."""
     return np.asarray(HORIZON * np.float32(0.4 + 0.6 * beam))
 
 
@@ -56,7 +56,7 @@ class Sky:
         return cls(sun, clouds, np.asarray(hills, np.float32), np.asarray(trees, np.float32))
 
     def radiance(self, rays: Field, beam: float, drift: float) -> Field:
-        """Return what is seen along rays that miss the ground.
+        """Return the radiance along rays that miss the ground.
 
         Parameters
         ----------
@@ -98,11 +98,13 @@ class Sky:
         height = np.maximum(rays[..., 1], 0.03)
         across = rays[..., 0] / height * np.float32(CLOUD_SCALE)
         along = (rays[..., 2] / height + np.float32(drift)) * np.float32(CLOUD_SCALE)
-        found = cv2.remap(self.clouds, across, along, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-        cover = smoothstep(found, 0.35, 1.5) * smoothstep(climb, 0.03, 0.14)
-        return np.asarray(cover, np.float32), smoothstep(-found, -3.0, -0.6)
+        density = cv2.remap(
+            self.clouds, across, along, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP
+        )
+        cover = smoothstep(density, 0.35, 1.5) * smoothstep(climb, 0.03, 0.14)
+        return np.asarray(cover, np.float32), smoothstep(-density, -3.0, -0.6)
 
 
 def _below(climb: Field, top: Field) -> Field:
-    """Opacity of what rises to ``top``: 1 below, fading to 0 over `SKYLINE_SHARPNESS`."""
+    """Opacity of a thing that rises to ``top``: 1 below, fading to 0 over `SKYLINE_SHARPNESS`."""
     return smoothstep(top - climb, -SKYLINE_SHARPNESS, SKYLINE_SHARPNESS)

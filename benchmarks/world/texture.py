@@ -68,7 +68,7 @@ class GroundTexture:
             used = np.flatnonzero(weight)
             if used.size:
                 band = slice(used[0], used[-1] + 1)
-                found = cv2.remap(
+                patch = cv2.remap(
                     texture,
                     column[band],
                     row[band] * np.float32(0.5**k) - np.float32(0.5),
@@ -76,5 +76,5 @@ class GroundTexture:
                     borderMode=border,
                     borderValue=self.outside or 0.0,
                 )
-                sampled[band] += weight[band].reshape(-1, *[1] * (found.ndim - 1)) * found
+                sampled[band] += weight[band].reshape(-1, *[1] * (patch.ndim - 1)) * patch
         return sampled

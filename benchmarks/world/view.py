@@ -1,4 +1,4 @@
-"""One view of the scene: from a pose and the light of a moment to what the camera sees."""
+"""One view of the scene: from a pose and the light of a moment to the image."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Moment:
 
 
 def see(scene: Scene, now: Moment) -> Film:
-    """Render what the camera sees: sky, ground, then panels from far to near."""
+    """Render the image: sky, ground, then panels from far to near."""
     rays = now.camera.rays()
     film = Film(
         np.zeros(rays.shape, np.float32),
@@ -61,8 +61,8 @@ def see(scene: Scene, now: Moment) -> Film:
 
 def _rows(where: Flags) -> slice:
     """Return the rows of ``(H, W)`` in which anything is true."""
-    found = np.flatnonzero(where.any(1))
-    return slice(int(found[0]), int(found[-1]) + 1)
+    rows = np.flatnonzero(where.any(1))
+    return slice(int(rows[0]), int(rows[-1]) + 1)
 
 
 def _lay_ground(film: Film, rays: Field, down: Flags, scene: Scene, now: Moment) -> None:

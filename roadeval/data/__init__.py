@@ -1,8 +1,8 @@
-"""The types that are passed between the packages: frozen, typed, with no library but NumPy.
+"""The types that the packages exchange: frozen, typed, with no library but NumPy.
 
 Images are ``(H, W, 3)`` uint8 RGB, masks ``(H, W)`` uint8 with 1 for road (or shadow) and 0
-otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or whatever epoch the
-log uses.
+otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or since the epoch of
+the log.
 """
 
 from roadeval.data.arrays import Packed, TruthBits, everywhere, ones, pack, unpack

@@ -1,4 +1,4 @@
-"""The kinds of arrays that the kernels take and return, and masks packed as bits."""
+"""Types of arrays that kernels take and return, and masks packed as bits."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ CodeTable = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.int32]
 """``(H, W)``: a component's number at each of its pixels, 0 outside."""
 Runs = npt.NDArray[np.int32]
-"""``(n, 4)``: row, first column, column after the last, and label, row after row and from left to
-right in each."""
+"""``(n, 4)``: row, first column, column after the last, and label, by rows and from left to
+right."""
 Costs = npt.NDArray[np.uint16]
-"""``(H, W)``: what a step of length 1 costs at each pixel."""
+"""``(H, W)``: the cost of a step of length 1 at each pixel."""
 Distances = npt.NDArray[np.int32]
-"""``(H, W)``: what the cheapest path to each pixel costs."""
+"""``(H, W)``: the cost of the cheapest path to each pixel."""
 Indices = npt.NDArray[np.int32]
 """``(n, m)``: indices into a list."""
 Masks = npt.NDArray[np.uint32]
 """``(n, m)``: 32 bits each."""
 Places = npt.NDArray[np.intp]
-"""``(n,)``: rows, columns, or places in a list."""
+"""``(n,)``: rows, columns, or positions in a list."""
 Flags = npt.NDArray[np.bool_]
 """``(n,)``: one flag each."""
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
 Values = npt.NDArray[np.floating]
-"""float32 of any shape. The type is wider: NumPy's stubs do not know that Python floats keep it."""
+"""float32 of any shape. The type is wider because NumPy's stubs widen it with Python floats."""
 Floats = npt.NDArray[np.float64]
 """float64 of any shape."""
 Vector = npt.NDArray[np.float64]
@@ -50,17 +50,17 @@ Matrix = npt.NDArray[np.float64]
 """``(n, m)``."""
 Bits = npt.NDArray[np.uint64]
 """``(H, words)`` of an ``(H, W)`` mask, C-contiguous, 64 pixels a word, the leftmost in the lowest
-bit; those beyond the width are 0. ``(K, H, words)`` of K masks."""
+bit; bits beyond the width are 0. K masks are ``(K, H, words)``."""
 Words = npt.NDArray[np.uint64]
 """``(n,)``: 64 bits a word."""
 Reach = npt.NDArray[np.int64]
-"""A structuring element that is symmetric in both directions, ``(r + 1,)``: how many pixels it
-extends to either side in its own row and in each of the r rows above and below, never more in a row
-further away."""
+"""A structuring element that is symmetric in both directions, ``(r + 1,)``: its extent in pixels to
+either side in the middle row, and in each of the r rows above and below; it never grows with the
+distance from the middle."""
 
 
 def sigmoid(values: Values) -> Values:
-    """Compute ``1 / (1 + exp(-x))`` of float32, in a form that cannot overflow."""
+    """Compute ``1 / (1 + exp(-x))`` of float32 without overflow."""
     return 0.5 + 0.5 * np.tanh(0.5 * values)
 
 
@@ -113,14 +113,14 @@ def ones(bits: Bits) -> int:
 
 @lru_cache(maxsize=8)
 def everywhere(shape: tuple[int, int]) -> Bits:
-    """Return the mask that holds every pixel of an image of ``shape`` (H, W): shared, read-only."""
+    """Return the mask of all pixels of an image of ``shape`` (H, W), shared and read-only."""
     bits = pack(np.ones(shape, np.uint8))
     bits.flags.writeable = False
     return bits
 
 
 def unpack(bits: Bits, width: int) -> Plane:
-    """Return the ``(H, width)`` uint8 mask, 0 or 1, that was packed."""
+    """Unpack bits to an ``(H, width)`` uint8 mask, 0 or 1."""
     return np.unpackbits(bits.view(np.uint8), axis=1, count=width, bitorder="little")
 
 
@@ -144,14 +144,11 @@ class TruthBits:
         return self.road | self.other
 
     def checksum(self) -> int:
-        """Return the CRC-32 of its road and its other pixels: it tells the truth from another."""
+        """Return the CRC-32 of the road and the other pixels, which identifies the truth."""
         return crc32(self.other.tobytes(), crc32(self.road.tobytes()))
 
     def bits_of(self, masks: Iterable[Packed]) -> Bits:
-        """Stack the bits of masks of the truth's shape: ``(K, H, words)``.
-
-        A `ValueError` if one has another shape.
-        """
+        """Stack the bits of masks, ``(K, H, words)``; a `ValueError` if one has another shape."""
         bits = []
         for mask in masks:
             if mask.shape != self.shape:

@@ -1,4 +1,4 @@
-"""What is known of a camera beside its pictures: its lens, and where it is mounted."""
+"""The calibration of a camera: its lens and its mounting."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 FISHEYE: Final = ("equidistant", "fisheye", "kannala_brandt")
-"""Models whose rays' angles, not their slopes, grow with the distance from the centre."""
+"""Models with a distance from the centre that grows with the angle of a ray, not with its slope."""
 
 
 @dataclass(frozen=True)
 class Mounting:
-    """Where a camera is, as seen from the frame at the root of the log's transforms."""
+    """The place of a camera in the frame at the root of the log's transforms."""
 
     parent: str
     """The root frame's name, as ``base_link``."""
     translation: tuple[float, ...]
-    """The camera's place in it: x, y, z in metres."""
+    """The camera's place in the root frame: x, y, z in metres."""
     rotation: tuple[float, ...]
-    """The rotation from the camera's axes to its axes, as a quaternion x, y, z, w."""
+    """The rotation from the camera's axes to the root frame's, as a quaternion x, y, z, w."""
 
     @property
     def has_body_axes(self) -> bool:
-        """Whether the camera's z points up, as a vehicle's, where a camera's points ahead."""
+        """Whether the camera's z points up, as a vehicle's, and not ahead."""
         x, y, z, w = self.rotation
         return 1 - 2 * (x * x + y * y) > 0.5 > abs(2 * (y * z + x * w))
 
@@ -36,20 +36,20 @@ class Calibration:
     topic: str
     width: int
     height: int
-    """Size in pixels of the images that they are for."""
+    """Size in pixels of the calibrated images."""
     matrix: tuple[float, ...]
     """The nine numbers of K, row by row: focal lengths and principal point in pixels."""
     model: str = ""
-    """The distortion's, as ``plumb_bob``; empty where none is named."""
+    """The model of the distortion, as ``plumb_bob``; empty if it has no name."""
     distortion: tuple[float, ...] = ()
     frame_id: str = ""
     """The camera's name in the log's transforms."""
     mounting: Mounting | None = None
-    """None where no static transform tells it."""
+    """None if no static transform shows it."""
 
     @property
     def problem(self) -> str:
-        """Return the first property that no camera can have, as "focal length is 0"; else ""."""
+        """The first impossible property, as "focal length is 0"; empty if there is none."""
         fx, skew, x, zero, fy, y, *last = (*self.matrix, *(math.nan,) * 9)[:9]
         short, long = sorted((self.width, self.height))
         pixels = f"{self.width}x{self.height} pixels"
@@ -72,7 +72,7 @@ class Calibration:
 
     @property
     def doubt(self) -> str:
-        """Return why its matrix is of images of another size (its centre is far off); else ""."""
+        """Why its matrix is doubtful: its centre is far from the middle; else empty."""
         x, y = self.matrix[2], self.matrix[5]
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""
@@ -81,21 +81,21 @@ class Calibration:
 
     @property
     def bends(self) -> bool:
-        """Whether straight lines are bent in its images: a fisheye's are without coefficients."""
+        """Whether it bends straight lines; a fisheye does even without coefficients."""
         return any(self.distortion) or self.model.lower() in FISHEYE
 
     def has_shape(self, width: int, height: int) -> bool:
-        """Return whether images of this size have the shape of its own, but for a pixel."""
+        """Return whether images of this size have the same shape, give or take a pixel."""
         off = abs(self.width * height - self.height * width)
         return off <= max(self.width + self.height, width + height)
 
     def part(
         self, corner: tuple[int, int], size: tuple[int, int], bins: Sequence[int]
     ) -> Calibration:
-        """Return the calibration of a part of the sensor of which so many pixels become one.
+        """Return the calibration of a part of the sensor whose pixels are binned.
 
-        As in ROS the corner comes off first, and then all is divided; but a centre in the very
-        middle, by the centres of pixels, stays there.
+        As in ROS, the corner is subtracted first, and all is divided then. A centre in the exact
+        middle stays there.
         """
         k, (across, down) = self.matrix, bins
         sides = (self.width, self.height)
@@ -108,10 +108,10 @@ class Calibration:
         return replace(self, width=size[0], height=size[1], matrix=matrix)
 
     def scaled(self, width: int, height: int) -> Calibration:
-        """Return the calibration of the same image in another size, in pixels."""
+        """Return the calibration of the same image in another size."""
         across, down = width / self.width, height / self.height
         k = self.matrix
-        # The centre of the first pixel is at (0, 0), so that its corner is at half a pixel less.
+        # The centre of the first pixel is at (0, 0), and its corner at (-0.5, -0.5).
         right, below = ((c + 0.5) * s - 0.5 for c, s in ((k[2], across), (k[5], down)))
         matrix = (k[0] * across, k[1] * across, right, k[3] * down, k[4] * down, below, *k[6:])
         return replace(self, width=width, height=height, matrix=matrix)

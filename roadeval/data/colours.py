@@ -1,7 +1,7 @@
-"""The palette: one colour a meaning, the same in the recording, the figures and the PDF.
+"""The palette: one colour for each meaning, in the recording, the figures and the PDF.
 
 The hues are those of Okabe and Ito (https://jfly.uni-koeln.de/color/), which people with any kind
-of colour vision can tell apart. Colours are sRGB, ``(r, g, b)`` of 0..255 each.
+of colour vision can distinguish. Colours are sRGB, ``(r, g, b)`` of 0..255 each.
 
 >>> hex_of(FP)
 '#D55E00'
@@ -23,14 +23,14 @@ BLUE: Final = (0, 114, 178)
 VERMILLION: Final = (213, 94, 0)
 PURPLE: Final = (204, 121, 167)
 GREY: Final = (153, 153, 153)
-"""Not of Okabe and Ito: for what is there to compare with."""
+"""The colour of references, which is not one of Okabe and Ito."""
 DARK_GREY: Final = (90, 90, 90)
 
 FILTERED: Final = BLUE
 UNFILTERED: Final = ORANGE
 BLIND: Final = GREY
 EXTRA: Final = (GREEN, PURPLE, SKY_BLUE, VERMILLION, YELLOW)
-"""Colours of further variants, in the order in which they are given out, again and again."""
+"""Colours of further variants, in a cycle."""
 
 TP: Final = GREEN
 FP: Final = VERMILLION
@@ -40,27 +40,24 @@ TN: Final = SKY_BLUE
 
 MOST_ERRORS: Final = (26, 10, 0)
 NEVER_LABELLED: Final = (187, 187, 187)
-"""The darkest shade of a map of errors, and that of what no frame labels."""
+"""The darkest shade of a map of errors, and the shade of pixels that no frame labels."""
 
 ROAD: Final = GREEN
 IGNORE: Final = (128, 128, 128)
 BOUNDARY: Final = YELLOW
 SHADOW: Final = SKY_BLUE
 RING: Final = YELLOW
-"""The colour of lit road around a shadow, from which its compensation is estimated."""
+"""The colour of the lit road around a shadow, from which the compensation is estimated."""
 
 CLEAR: Final = (0, 0, 0, 0)
-"""Fully transparent: what is under it shows."""
-
-
-_ON_PAPER: Final = {YELLOW: BLACK, GREY: (138, 138, 138)}
+"""A fully transparent colour."""
 
 
 def on_paper(colour: Colour) -> Colour:
-    """Return the colour, or where it is faint on white another for the same thing."""
-    return _ON_PAPER.get(colour, colour)
+    """Return the colour, or a substitute if it is faint on white."""
+    return {YELLOW: BLACK, GREY: (138, 138, 138)}.get(colour, colour)
 
 
 def hex_of(colour: Colour) -> str:
-    """Return the colour as Matplotlib, Typst and HTML write it: ``#RRGGBB``."""
+    """Return the colour in the notation of Matplotlib, Typst and HTML: ``#RRGGBB``."""
     return "#{:02X}{:02X}{:02X}".format(*colour)

@@ -1,4 +1,4 @@
-"""A camera frame: image, times, truth, and what it is used for."""
+"""A camera frame: image, times, truth, and use."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ IGNORE: Final = 255
 
 @dataclass(frozen=True)
 class Moment:
-    """When an image was taken: its ``number`` and ``stamp_ns``, as in `Frame`."""
+    """The ``number`` and ``stamp_ns`` of a `Frame`."""
 
     number: int
     stamp_ns: int
@@ -45,37 +45,36 @@ class Frame:
     """Header stamp."""
     log_time_ns: int
     image: Rgb
-    """``(H, W, 3)`` uint8 RGB."""
     payload: bytes | memoryview
-    """The image as the log holds it (for a compressed image the JPEG or PNG file itself)."""
+    """The image in the log; for a compressed image the JPEG or PNG file itself."""
     media_type: str | None = None
-    """``image/jpeg`` or ``image/png`` if ``payload`` is such a file, else None."""
+    """``image/jpeg`` or ``image/png`` if ``payload`` is such a file."""
     truth: Truth | None = None
-    """``(H, W)`` uint8 road truth (0, 1, 255), or None for an unlabelled frame."""
+    """Road truth, or None for an unlabelled frame."""
     shadow_truth: Truth | None = None
-    """``(H, W)`` uint8 (0, 1, 255) mask of truly shadowed pixels, or None."""
+    """Mask of truly shadowed pixels, with values as in ``truth``."""
     external: Mapping[str, Mask] = field(default_factory=dict)
-    """Another system's road masks, from the log itself or from elsewhere, by variant name."""
+    """Road masks of other systems, by variant name."""
     probabilities: Mapping[str, Probability] = field(default_factory=dict)
-    """How probable road is to such a system, where its masks are thresholds on that."""
+    """Probabilities of road, from which thresholds make masks of other systems."""
     camera: str = ""
     """The image topic."""
 
     @property
     def moment(self) -> Moment:
-        """When it was taken."""
+        """Its number and stamp."""
         return Moment(self.number, self.stamp_ns)
 
     def digest(self) -> str:
-        """Return a hash of the image as logged: equal images in two logs have the same."""
+        """Return a hash of the payload, which is the same for equal images in two logs."""
         return hashlib.blake2b(self.payload, digest_size=16).hexdigest()
 
 
 class Role(StrEnum):
     """The use of a frame in a run. Only `EVALUATED` frames are ever counted.
 
-    A `COPY` shows what a frame that trained the model shows. A `PICKED` one was labelled because it
-    was in doubt, so that it says nothing of the others.
+    A `COPY` repeats the image of a training frame. A `PICKED` frame was labelled because it was in
+    doubt, so it does not represent the others.
     """
 
     EVALUATED = "evaluated"

@@ -1,4 +1,4 @@
-"""Pixels by the code of their probability, and the threshold on it that errs least."""
+"""Histograms of pixels by their probability of road, and the threshold with the fewest errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def histogram(probability: Probability, truth: Truth) -> Histogram:
 
 
 def wrong_above(counts: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Return how many pixels are wrong where road is what exceeds each code, ``(65536,)``.
+    """Count the wrong pixels if road exceeds a code, for each code, ``(65536,)``.
 
     ``counts`` are ``(2, 65536)``: non-road and road.
     """
@@ -36,10 +36,7 @@ def wrong_above(counts: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 
 
 def best_code(counts: npt.NDArray[Any]) -> int:
-    """Return the code that errs least where road is what exceeds it.
-
-    Of neighbours that err alike it is the middle one.
-    """
+    """Return the code with the fewest errors if road exceeds it; the middle one of equals."""
     wrong = wrong_above(counts)
     first = int(wrong.argmin())
     beyond = np.flatnonzero(wrong[first:] != wrong[first])

@@ -1,4 +1,4 @@
-"""Layers: the named arrays that stages return, and how each is read and coloured."""
+"""Layers: the named arrays that stages return, with their kinds and colours."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roadeval.data.frame import IGNORE, NON_ROAD, ROAD
 
 
 class LayerKind(StrEnum):
-    """How a layer's array is to be read.
+    """The kind of a layer's array.
 
     `MASK`: one class or a few, shown by colour alone. `LABELS`: classes with names in the viewer.
     `SCALAR`: a map of numbers. `RGB`: a colour image.
@@ -44,24 +44,23 @@ class LayerSpec:
     name: str
     """Last part of the entity path, as ``ndi`` in ``/filtered/ndi``."""
     kind: LayerKind
-    """How the array is to be read."""
     title: str
-    """A few words for a person, as ``NDI (Eq. 6)``."""
+    """A few words for people, as ``NDI (Eq. 6)``."""
     classes: tuple[LabelClass, ...] = ()
     """For `LABELS` and `MASK`: the values that occur."""
     value_range: tuple[float, float] = (0.0, 1.0)
     """For `SCALAR`: the closed range of meaning; values outside are clipped for display."""
     exact: bool = True
-    """Whether the recording must give back the same array (masks, labels, colours), or, for a
-    scalar map, the nearest of 256 levels over ``value_range``; from an image of more than 800
-    columns the means of blocks of pixels, of 400 columns at most, to 1/127 of half the range. A
+    """Whether the recording must give back the same array (masks, labels, colours). A scalar map
+    comes back as the nearest of 256 levels over ``value_range``; if the image has more than 800
+    columns, as the means of blocks of pixels, of 400 columns at most, to 1/127 of half the range. A
     layer that is not exact is recorded with some loss, at half the resolution or as small as that.
     """
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """A named array that a stage hands out; a mask of two classes may stay packed."""
+    """A named array that a stage returns; a mask of two classes may stay packed."""
 
     spec: LayerSpec
     content: npt.NDArray[np.uint8] | npt.NDArray[np.float32] | Packed
@@ -97,7 +96,7 @@ ERRORS: Final = LayerSpec(
 
 
 def mask_spec(name: str, title: str, **colours: tuple[int, int, int, int]) -> LayerSpec:
-    """Describe a mask named ``name``: of 0 non-road and 1 road, or of named classes from 0."""
+    """Describe a mask of non-road and road, or of named classes with values from 0 and colours."""
     named = enumerate(colours.items())
-    classes = tuple(LabelClass(value, each, colour) for value, (each, colour) in named)
+    classes = tuple(LabelClass(value, label, colour) for value, (label, colour) in named)
     return LayerSpec(name, LayerKind.MASK, title, classes or ROAD_CLASSES)

@@ -1,4 +1,4 @@
-"""Results of a frame: what each variant's stages give, their score and names."""
+"""Results of a frame: the outputs of each variant's stages, their counts and names."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from roadeval.data.layer import Layer, LayerSpec
 CAMERA: Final = "camera"
 FILTERED: Final = "filtered"
 UNFILTERED: Final = "unfiltered"
+"""The names of the two default variants: with the chain's filters, and without."""
 TUNED: Final = "_tuned"
-"""Ends the name of a tuned variant; before it stands that of its method."""
-"""The names of the two variants that come by default: with the chain's filters, and without."""
+"""The ending of a tuned variant's name, after the name of its method."""
 BASELINE: Final = "blind"
 """The variant name of the baseline that never looks at the image."""
 FINAL_STAGE: Final = "post"
-"""The stage whose mask is the pipeline's answer, and under which the baseline is filed."""
+"""The stage with the pipeline's final mask; the baseline has this stage, too."""
 
 RESERVED: Final = frozenset(
     {
@@ -32,24 +32,19 @@ RESERVED: Final = frozenset(
         *("roadeval", "state", "timing", "true_shadow", "truth"),
     }
 )
-"""Reserved names, which no variant may have: tables and recordings use them otherwise."""
+"""Names that no variant may have, because tables and recordings use them."""
 
-_PLAIN: Final = re.compile(r"[A-Za-z0-9_-]{1,200}")
-"""No longer than the name of a file can be, with an ending."""
 OUTCOMES: Final = ("TP", "TN", "FP", "FN")
 """The columns of `Counts` in tables, in the order of its fields."""
 
 
 def is_plain(name: str) -> bool:
-    """Return whether results can hold a name of a variant, stage or region.
-
-    It is a column's cell, a part of a path in the recording, and a word in figures and tables.
-    """
-    return _PLAIN.fullmatch(name) is not None
+    """Return whether a variant, stage or region may have this name in paths, tables and figures."""
+    return re.fullmatch(r"[A-Za-z0-9_-]{1,200}", name) is not None
 
 
 def as_plain(name: str) -> str:
-    """Return a name as letters, digits, ``-`` and ``_`` alone, for files, identities and paths.
+    """Return a name with only letters, digits, ``-`` and ``_``, for files, identities and paths.
 
     >>> as_plain("/front/image raw")
     'front_image_raw'
@@ -58,7 +53,7 @@ def as_plain(name: str) -> str:
 
 
 class Counts(NamedTuple):
-    """Pixels by outcome; road is the positive class, ignored pixels are in none (section 5)."""
+    """Pixels by outcome; road is the positive class, ignored pixels are not counted (section 5)."""
 
     tp: int = 0
     tn: int = 0
@@ -73,7 +68,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Tally:
-    """The counts of one stage of one variant on one frame, whole and by region.
+    """The counts of one stage of one variant on one frame, in all and by region.
 
     ``rates`` are the fractions of Eq. 24-29 by name; an undefined one is NaN.
     """
@@ -86,10 +81,7 @@ class Tally:
 
 
 class Change(NamedTuple):
-    """Pixels that one mask repairs and spoils against another.
-
-    ``repaired`` are newly right, ``spoiled`` newly wrong, of the ``labelled`` ones.
-    """
+    """Pixels that a mask repairs (newly right) and spoils (newly wrong) compared with another."""
 
     repaired: int = 0
     spoiled: int = 0
@@ -111,17 +103,15 @@ class Output:
     image: Rgb | None = None
     """``(H, W, 3)`` uint8 RGB that replaces the image for the stages after it, if any."""
     mask: Packed | None = None
-    """Its road mask, if it makes one; also among its layers, under the stage's name."""
+    """Its road mask, if any; also among its layers, under the stage's name."""
     regions: Mapping[str, Packed] = field(default_factory=dict)
     """Sets of pixels to count separately, by name."""
     facts: Mapping[str, float] = field(default_factory=dict)
-    """Numbers about the frame, by name, as the ``threshold`` that it chose."""
+    """Numbers about the frame by name, as the ``threshold`` that was chosen."""
     probability: Probability | None = None
-    """How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1, where the mask is a
-    threshold on it.
-    """
+    """The probability of road, if a threshold on it gives the mask."""
     by_class: tuple[Probability, ...] = ()
-    """Probabilities of each class of road, where there are several."""
+    """Probabilities of each class of road, if there are several."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,16 +124,16 @@ class StageResult:
 
     def without_layers(self) -> StageResult:
         """Return the mask and the facts, which are needed after the layers are encoded."""
-        kept = Output(mask=self.output.mask, facts=self.output.facts)
-        return StageResult(self.stage, kept, self.seconds)
+        output = Output(mask=self.output.mask, facts=self.output.facts)
+        return StageResult(self.stage, output, self.seconds)
 
 
 @dataclass(frozen=True, eq=False)
 class VariantResult:
     """The outputs of a variant's stages for one frame, in the order they ran.
 
-    ``oracles`` holds, by the name of a stage that was replaced by the truth, the road masks of
-    the stages after it by theirs. They are no results: see `roadeval.pipeline.chain.Chain`.
+    ``oracles`` has the road masks that the later stages make after a stage is replaced by the
+    truth, by both names. They are no results: see `roadeval.pipeline.chain.Chain`.
     """
 
     variant: str
@@ -151,7 +141,7 @@ class VariantResult:
     oracles: Mapping[str, Mapping[str, Packed]] = field(default_factory=dict)
 
     def masks(self) -> Iterator[tuple[str, Packed]]:
-        """Yield each stage that has a road mask, with the mask; `Packed.pixels` gives its array."""
+        """Yield the name and the mask of each stage with a road mask."""
         for result in self.stages:
             if result.output.mask is not None:
                 yield result.stage, result.output.mask
@@ -169,7 +159,7 @@ class VariantResult:
 
 @dataclass(frozen=True)
 class VariantLayout:
-    """A variant as known before the first frame: its stages with masks and its layers."""
+    """The stages with masks and the layers of a variant, known before the first frame."""
 
     name: str
     title: str
@@ -178,7 +168,7 @@ class VariantLayout:
 
 
 class Health(StrEnum):
-    """How a variant fared on a frame, for the recording's state lanes."""
+    """The health of a variant on a frame, for the recording's state lanes."""
 
     OK = "ok"
     DEGRADED = "degraded"
@@ -187,53 +177,47 @@ class Health(StrEnum):
 
 @dataclass(frozen=True)
 class Doubt:
-    """How much a variant's final mask is in doubt on a frame without truth; never an error rate."""
+    """Measures of doubt about a variant's final mask without truth; none is an error rate."""
 
     variant: str
     stage: str
     entropy: float
-    """Mean over pixels of how unsure road is, in bits; NaN where no stage says how probable it is.
-    """
+    """Mean entropy of road over pixels, in bits; NaN if no stage gives a probability."""
     differs: Mapping[str, float] = field(default_factory=dict)
-    """The share of pixels on which each other variant's final mask differs."""
+    """The share of pixels in which each other variant's final mask differs."""
     flicker: float = math.nan
-    """The share of pixels that change from the frame before; NaN where that was not seen."""
+    """The share of pixels that change from the frame before; NaN if that is missing."""
 
     @property
     def disagreement(self) -> float:
-        """The mean of ``differs``; NaN for a variant alone."""
+        """The mean of ``differs``; NaN if there is no other variant."""
         return sum(self.differs.values()) / len(self.differs) if self.differs else math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class FrameMetres:
-    """The measures of a final mask of a frame in metres.
-
-    Of S stances of the camera the first is as it is said to stand.
-    """
+    """Measures of a final mask in metres, for S poses of the camera; the first is calibrated."""
 
     measures: Sequence[tuple[str, int]]
-    """M names, and the metres ahead at which each is taken; 0 of one that is not."""
+    """M names, and the metres ahead of each measure; 0 if it has none."""
     ends: Floats
-    """``(S, M, 2)``: where the mask and where the truth ends, in metres; NaN where none is seen."""
+    """``(S, M, 2)``: the ends of the mask and of the truth in metres; NaN if none is seen."""
     regions: Sequence[str]
-    """R names: the bands of distance, then the ground seen from above."""
+    """R names: the bands of distance, and the ground seen from above."""
     counts: Sums
     """``(S, R, 4)``: TP, TN, FP and FN."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameResult:
-    """Everything known about one replayed frame: what is recorded and what is tabled.
+    """Everything about one replayed frame that is recorded or written to tables.
 
-    ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
-    against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
-    those of the final masks by variant, ``histograms`` the labelled pixels by how probable road is,
-    for each variant and stage that says so, and ``oracles`` the counts of what the stages
-    made once one was replaced by the truth, by that one. ``metres`` are the measures of each
-    final mask by variant where the camera is known, and ``above`` the ground seen from above by how
-    probable road is. ``doubts`` has each variant's,
-    without truth. ``notes`` are sentences for a person.
+    ``tallies`` is empty unless the frame is evaluated, ``doubts`` unless it has no truth.
+    ``truth_bits`` is the truth of the counts. ``changes`` are from stage to stage and from final
+    mask to final mask. ``contours``, and ``metres`` if the camera is known, measure final masks by
+    variant. ``histograms`` count labelled pixels by their probability of road, for each variant and
+    stage with one, and ``above`` does so for the ground seen from above. ``oracles`` are the counts
+    of later stages after one is replaced by the truth, by that one. ``notes`` are sentences.
     """
 
     frame: Frame
@@ -252,10 +236,10 @@ class FrameResult:
     metres: Mapping[str, FrameMetres] = field(default_factory=dict)
     above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     apart: Mapping[str, float] = field(default_factory=dict)
-    """ERR by variant of a frame that was labelled because it was in doubt, which no sum counts."""
+    """ERR by variant of a frame that was labelled because it was in doubt; no total counts it."""
 
     def without_layers(self) -> FrameResult:
-        """Return the result without layers, which take most memory, for summing up."""
+        """Return the result without layers, which take most memory."""
         variants = tuple(
             VariantResult(v.variant, tuple(stage.without_layers() for stage in v.stages))
             for v in self.variants
@@ -270,7 +254,7 @@ T = TypeVar("T")
 
 
 def as_tree(items: Iterable[tuple[tuple[str, str], T]]) -> dict[str, dict[str, T]]:
-    """Return what there is by two names, as a variant's and a stage's, one within the other."""
+    """Return a tree of items by two names, such as a variant's and a stage's."""
     tree: dict[str, dict[str, T]] = {}
     for (one, other), item in items:
         tree.setdefault(one, {})[other] = item

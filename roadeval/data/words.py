@@ -1,4 +1,4 @@
-"""Numbers, times and lists as a person reads them."""
+"""Numbers, times and lists in words for people."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from os.path import commonprefix
 from typing import Any, Final, TypeGuard
 
 DASH: Final = "\N{EN DASH}"
-"""Between two numbers; and where a number is undefined."""
+"""Stands between two numbers, and for an undefined number."""
 MINUS: Final = "\N{MINUS SIGN}"
 UNSET: Final = "not given"
-"""The value of a setting that is not given."""
-_YEAR_NS: Final = 365 * 24 * 3600 * 1_000_000_000
+"""The text of a setting without a value."""
 
 
 def defined(number: float | None) -> TypeGuard[float]:
@@ -22,7 +21,7 @@ def defined(number: float | None) -> TypeGuard[float]:
 
 
 def in_percent(fraction: float | None) -> float:
-    """Return a fraction as a number of percent, NaN where it is undefined."""
+    """Return a fraction in percent; NaN if it is undefined."""
     return 100 * fraction if defined(fraction) else math.nan
 
 
@@ -48,7 +47,7 @@ def points(difference: float | None, digits: int = 2) -> str:
 
 
 def plain_points(difference: float | None, digits: int = 2) -> str:
-    """Return `points` with the minus sign that every terminal has, and a script can search for.
+    """Return `points` with the minus sign of ASCII, for terminals and scripts.
 
     >>> plain_points(-0.079)
     '-7.90'
@@ -57,7 +56,7 @@ def plain_points(difference: float | None, digits: int = 2) -> str:
 
 
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:
-    """Return an interval of a difference of two fractions in percentage points.
+    """Return an interval of the difference between two fractions in percentage points.
 
     >>> interval(0.01, 0.02)
     '+1.00 to +2.00'
@@ -104,26 +103,26 @@ def setting(value: Any) -> str:
     if value is None or value in ({}, [], ()):
         return UNSET
     if isinstance(value, dict):
-        return ", ".join(f"{name}={each}" for name, each in value.items())
+        return ", ".join(f"{name}={item}" for name, item in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def timestamp(stamp_ns: int) -> str:
-    """Return a stamp as date and time, or in seconds where it is less than a year.
+    """Return a stamp as date and time, or in seconds if it is less than a year.
 
     >>> timestamp(12_345_000_000)
     '12.345 s'
     """
-    if stamp_ns < _YEAR_NS:
+    if stamp_ns < 365 * 24 * 3600 * 1_000_000_000:
         return f"{stamp_ns / 1e9:.3f} s"
     at = datetime.fromtimestamp(stamp_ns // 1_000_000_000, UTC)
     return f"{at:%Y-%m-%d %H:%M:%S}.{stamp_ns % 1_000_000_000 // 1_000_000:03d} UTC"
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Return each of several paths without the parts at its ends that all of them share.
+    """Return several paths, each without the parts at both ends that all of them share.
 
     >>> short_names(["/front/image_raw", "/rear/image_raw"])
     {'/front/image_raw': 'front', '/rear/image_raw': 'rear'}

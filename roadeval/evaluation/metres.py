@@ -1,7 +1,7 @@
 """Masks in metres: distance bands, the ground seen from above, edges of the road, free distance.
 
-All of it holds for flat ground. How far a wrong pitch or height would move a number is counted by
-counting again as if the camera stood otherwise, see `STANCES`.
+All numbers hold for flat ground. To show how much a wrong pitch or height would change them, they
+are counted again for other stances of the camera, see `STANCES`.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from roadeval.geometry.ground import Ground
 from roadeval.geometry.plan import OUTSIDE, Plan, pixels_of
 
 STANCES: Final = ((0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -0.05), (0.0, 0.05))
-"""As the camera is said to stand, and as it might: degrees further down, and metres higher."""
+"""Stances of the camera, the calibrated one first: degrees further down, and metres higher."""
 ABOVE: Final = "from_above"
-"""The region of the ground seen from above: it counts square cells of ground, not pixels."""
+"""Region of the ground seen from above; it counts square cells of ground, not pixels."""
 UNPLACED: Final = "no_ground"
-"""The region of the pixels above the horizon, or farther away than all bands."""
+"""Region of the pixels above the horizon, or farther away than all bands."""
 LEFT: Final = "left_edge"
 RIGHT: Final = "right_edge"
 FREE: Final = "free_distance"
-"""The measures of a mask's ends."""
+"""Measures of a mask's ends."""
 STEP: Final = 0.004
-"""Metres between the places of a line that are looked up, to find the pixels that it crosses."""
+"""Metres between places of a line, at which the pixels that it crosses are looked up."""
 FARTHEST: Final = 4000
-"""Places of a line at most."""
+"""Greatest number of places of a line."""
 GAP: Final = 0.3
-"""A gap in the road of fewer metres across is no edge; ahead of fewer than `GAP_AHEAD`."""
+"""A gap in the road of fewer metres across is no edge; ahead, of fewer than `GAP_AHEAD`."""
 GAP_AHEAD: Final = 0.5
 LEVELS: Final = 256
 """Thresholds of KITTI's road benchmark, whose confidences have eight bits."""
 Pixels = npt.NDArray[np.intp]
-"""``(n,)``: places in a flat image; `OUTSIDE` of none."""
+"""``(n,)``: places in a flat image, or `OUTSIDE`."""
 
 
 def plan_of(ground: Ground, settings: EvaluationSettings) -> Plan:
@@ -60,21 +60,21 @@ def band_name(near: int, far: int) -> str:
 class Survey:
     """The places on the ground of an image's pixels, for images of the size of ``ground``.
 
-    Made once, it counts masks by distance and from above, and finds where the road ends.
+    It is made once, counts masks by distance and from above, and finds where the road ends.
     """
 
     def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:
         self.ground = ground
         self._settings = settings
         self._shape = ground.height, ground.width
-        self._grounds = [ground.moved(*each) for each in STANCES[: self.stances]]
+        self._grounds = [ground.moved(*stance) for stance in STANCES[: self.stances]]
         edges = [(name, at) for at in settings.edges_at for name in (LEFT, RIGHT)]
         self.measures = (*edges, (FREE, 0))
-        """The name of each measure, and the distance at which it is taken."""
+        """Name of each measure, and the distance at which it is taken."""
 
     @property
     def stances(self) -> int:
-        """How many of `STANCES` are counted: the first alone where a homography is all there is."""
+        """Number of `STANCES` that are counted: only the first if a homography is all there is."""
         return len(STANCES) if self.ground.is_posed else 1
 
     @cached_property
@@ -83,23 +83,20 @@ class Survey:
         height, width = self._shape
         columns, rows = np.meshgrid(np.arange(float(width)), np.arange(float(height)))
         rays = self.ground.rays(np.column_stack([columns.ravel(), rows.ravel()]))
-        found = []
-        for ground in self._grounds:  # the lens is the same, however the camera stands
+        stances = []
+        for ground in self._grounds:  # the lens is the same for each stance
             ahead = ground.places_of(rays)[:, 0].reshape(self._shape)
-            found.append(
-                {
-                    band_name(near, far): pack((near <= ahead) & (ahead < far))
-                    for near, far in pairwise(self._settings.distances)
-                }
-            )
-        return found
+            edges = pairwise(self._settings.distances)
+            bands = {(near, far): (near <= ahead) & (ahead < far) for near, far in edges}
+            stances.append({band_name(*band): pack(pixels) for band, pixels in bands.items()})
+        return stances
 
     @cached_property
     def regions(self) -> dict[str, Bits]:
-        """The regions of the frame that it counts: the bands, and what lies in none."""
+        """Regions of a frame: the bands, and the pixels that lie in none of them."""
         bands = self.bands[0]
-        placed = unpack(np.bitwise_or.reduce([*bands.values()]), self._shape[1])
-        return {**bands, UNPLACED: pack(placed == 0)}
+        in_bands = unpack(np.bitwise_or.reduce([*bands.values()]), self._shape[1])
+        return {**bands, UNPLACED: pack(in_bands == 0)}
 
     def levels(self, probability: Probability, truth: Truth) -> Histogram:
         """Count cells of the ground seen from above: ``(2, LEVELS)`` uint32, non-road and road.
@@ -108,19 +105,17 @@ class Survey:
         that a probability reaches.
         """
         pixels, cells = self._above
-        codes, labels = (each.ravel()[pixels] for each in (probability, truth))
-        levels = codes // ((CODES - 1) // (LEVELS - 1))
-        counts = [
-            np.bincount(levels[labels == each], cells[labels == each], LEVELS)
-            for each in (NON_ROAD, ROAD)
-        ]
+        labels = truth.ravel()[pixels]
+        levels = probability.ravel()[pixels] // ((CODES - 1) // (LEVELS - 1))
+        chosen = [labels == label for label in (NON_ROAD, ROAD)]
+        counts = [np.bincount(levels[cell], cells[cell], LEVELS) for cell in chosen]
         return np.array(counts, np.uint32)
 
     @cached_property
     def _cells(self) -> Sums:
-        """How many cells of the ground seen from above each pixel stands for, ``(S, H, W)``.
+        """Number of cells of the ground seen from above for each pixel, ``(S, H, W)``.
 
-        A cell takes the pixel in which its centre lies.
+        A cell belongs to the pixel in which its centre lies.
         """
         height, width = self._shape
         counts = []
@@ -131,26 +126,26 @@ class Survey:
 
     @cached_property
     def _above(self) -> tuple[Pixels, Floats]:
-        """The pixels seen from above as the camera is said to stand, and the cells of each."""
+        """The pixels seen from above by the first stance, and the number of cells of each."""
         cells = self._cells[0].ravel().astype(float)
         pixels = np.flatnonzero(cells)
         return pixels, cells[pixels]
 
     @cached_property
     def digits(self) -> list[Bits]:
-        """The binary digits of how many cells each pixel stands for, ``(H, words)`` each.
+        """The binary digits of each pixel's number of cells, ``(H, words)`` each.
 
-        The least digit of a stance is its first. Pixels counted in each digit, times the digit's
-        worth, are the cells.
+        The least digit of a stance is its first. The sum over digits of the pixels that have it,
+        times its worth, is the number of cells.
         """
         digits = range(max(1, int(self._cells.max()).bit_length()))
         return [pack((cells >> digit) & 1) for cells in self._cells for digit in digits]
 
     @cached_property
     def _lines(self) -> list[_Line]:
-        """The lines along which a road's ends are looked for: of each stance one a measure's place.
+        """The lines along which a road's ends are searched, for each stance.
 
-        They lie across at each distance, and straight ahead.
+        They lie across at each distance, and the last one straight ahead.
         """
         settings = self._settings
         half = settings.plan_width / 2
@@ -178,9 +173,9 @@ class Survey:
     def ends(self, masks: Bits, truth: TruthBits) -> Floats:
         """Return where masks and the truth end, ``(K, S, M, 2)``, see `FrameMetres.ends`.
 
-        Across, the truth's road is the one nearest to the line straight ahead, and a mask's the one
-        nearest to the middle of that; what runs out of the picture, or into pixels without truth,
-        has no end there. Ahead, both end at the latest where the truth is no longer known.
+        Across, the truth's road is the one nearest to the line straight ahead, and a mask's road
+        the one nearest to the middle of the truth's. A road that leaves the picture, or meets
+        pixels without truth, has no end there. Ahead, both end at the latest where the truth does.
         """
         lines, places = self._lines, len(self._settings.edges_at) + 1
         crossed = np.concatenate([line.pixels for line in lines])
@@ -190,23 +185,25 @@ class Survey:
         )
         taken = flags.reshape(len(flags), -1).take(crossed, axis=1)
         ends = np.cumsum([len(line.pixels) for line in lines])
-        road, labelled, *own = (_runs(each, ends) for each in taken)
-        found = np.full((len(own), len(lines), 2, 2), np.nan)
+        road, labelled, *mask_runs = (_runs(flags_of_lines, ends) for flags_of_lines in taken)
+        found_ends = np.full((len(masks), len(lines), 2, 2), np.nan)
         for number, line in enumerate(lines):
-            known, borders = labelled[number], line.borders
+            with_truth, borders = labelled[number], line.borders
             if number % places == places - 1:
-                end, start, cap = _ahead(road[number], known, borders)
-                found[:, number, 0, 1] = end
-                nothing = borders[start] if known else math.nan
-                for place, runs in enumerate(own):
-                    found[place, number, 0, 0] = _free(runs[number], start, cap, borders, nothing)
+                end, start, cap = _ahead(road[number], with_truth, borders)
+                found_ends[:, number, 0, 1] = end
+                nothing = borders[start] if with_truth else math.nan
+                for place, runs in enumerate(mask_runs):
+                    free = _free(runs[number], start, cap, borders, nothing)
+                    found_ends[place, number, 0, 0] = free
                 continue
-            *sides, middle = _sides(road[number], known, borders, 0.0)
-            found[:, number, :, 1] = sides
-            whole = [(0, len(line.pixels))]
-            for place, runs in enumerate(own):
-                found[place, number, :, 0] = _sides(runs[number], whole, borders, middle)[:2]
-        by_stance = found.reshape(len(own), self.stances, 2 * places, 2)
+            *sides, middle = _sides(road[number], with_truth, borders, 0.0)
+            found_ends[:, number, :, 1] = sides
+            line_run = [(0, len(line.pixels))]
+            for place, runs in enumerate(mask_runs):
+                *sides, _ = _sides(runs[number], line_run, borders, middle)
+                found_ends[place, number, :, 0] = sides
+        by_stance = found_ends.reshape(len(masks), self.stances, 2 * places, 2)
         return by_stance[:, :, :-1]
 
 
@@ -225,11 +222,11 @@ class _Line(NamedTuple):
 
 
 Runs = list[tuple[int, int]]
-"""The first pixel of each stretch on a line, and the one after its last."""
+"""The first pixel of each stretch on a line, and the pixel after its last."""
 
 
 def _runs(flags: Plane, ends: Sums) -> list[Runs]:
-    """Return the stretches of pixels that are set, line by line; ``ends`` are the lines' ends."""
+    """Return the stretches of set pixels on each line; ``ends`` are the places after its last."""
     padded = np.concatenate([[0], flags, [0]])
     changed = np.asarray(padded[1:] != padded[:-1])
     changed[ends[:-1]] = True  # a stretch ends with its line
@@ -238,15 +235,15 @@ def _runs(flags: Plane, ends: Sums) -> list[Runs]:
     stops = at[np.searchsorted(at, starts, "right")]
     firsts = np.concatenate([[0], ends[:-1]])
     lines = np.searchsorted(ends, starts, "right")
-    found: list[Runs] = [[] for _ in ends]
+    by_line: list[Runs] = [[] for _ in ends]
     shifts = firsts[lines]
     pairs = zip(lines.tolist(), (starts - shifts).tolist(), (stops - shifts).tolist(), strict=True)
     for line, start, stop in pairs:
-        found[line].append((start, stop))
-    return found
+        by_line[line].append((start, stop))
+    return by_line
 
 
-def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
+def _join_runs(runs: Runs, borders: list[float], gap: float) -> Runs:
     """Join stretches with less than ``gap`` metres between them."""
     joined: Runs = []
     for start, stop in runs:
@@ -258,14 +255,15 @@ def _joined(runs: Runs, borders: list[float], gap: float) -> Runs:
 
 
 def _sides(
-    runs: Runs, known: Runs, borders: list[float], middle: float
+    runs: Runs, labelled: Runs, borders: list[float], middle: float
 ) -> tuple[float, float, float]:
     """Return the left and the right end of the road nearest to a place, and its middle, in metres.
 
-    An end beyond which nothing is known is NaN. Without road all three are, but for the middle.
+    An end beyond which nothing is labelled is NaN. Without road both ends are NaN, and the middle
+    is the place.
     """
     best, far = None, math.inf
-    for start, stop in _joined(runs, borders, GAP):
+    for start, stop in _join_runs(runs, borders, GAP):
         away = max(borders[stop] - middle, middle - borders[start], 0.0)
         if away < far:
             best, far = (start, stop), away
@@ -273,26 +271,26 @@ def _sides(
         return math.nan, math.nan, middle
     start, stop = best
     return (
-        borders[start] if any(first < start <= end for first, end in known) else math.nan,
-        borders[stop] if any(first <= stop < end for first, end in known) else math.nan,
+        borders[start] if any(first < start <= end for first, end in labelled) else math.nan,
+        borders[stop] if any(first <= stop < end for first, end in labelled) else math.nan,
         (borders[start] + borders[stop]) / 2,
     )
 
 
-def _ahead(road: Runs, known: Runs, borders: list[float]) -> tuple[float, int, float]:
-    """Return where the truth's road ahead ends, its first pixel, and how far it is known.
+def _ahead(road: Runs, labelled: Runs, borders: list[float]) -> tuple[float, int, float]:
+    """Return where the truth's road ahead ends, its first pixel, and where the labels end.
 
-    The ends are in metres; the road's is NaN where there is none at the begin.
+    The ends are in metres; the road's is NaN if the first labelled pixel is no road.
     """
-    if not known:
+    if not labelled:
         return math.nan, 0, math.nan
-    start, stop = _joined(known, borders, GAP_AHEAD)[0]
+    start, stop = _join_runs(labelled, borders, GAP_AHEAD)[0]
     return _free(road, start, borders[stop], borders, math.nan), start, borders[stop]
 
 
 def _free(runs: Runs, start: int, cap: float, borders: list[float], nothing: float) -> float:
-    """Return how far the road reaches from a pixel on, in metres, at most to ``cap``."""
-    for first, stop in _joined(runs, borders, GAP_AHEAD):
+    """Return where the road from a pixel on ends, in metres, at most ``cap``; else ``nothing``."""
+    for first, stop in _join_runs(runs, borders, GAP_AHEAD):
         if first <= start < stop:
             return min(borders[stop], cap)
     return nothing

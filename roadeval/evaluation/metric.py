@@ -11,14 +11,14 @@ from roadeval.data import Counts
 
 
 class Shown(IntEnum):
-    """Where people see a metric; each place includes those before it."""
+    """Places where people see a metric; each includes the places before it."""
 
     IN_FILES = 0
-    """A column of the tables and a series of the recording, and no more."""
+    """Columns of the tables and series of the recording only."""
     IN_FULL = 1
-    """Where all rates of a mask are: key tables, rows over the drive, paired differences."""
+    """Also tables of all rates of a mask: key tables, rows over the drive, paired differences."""
     EVERYWHERE = 2
-    """Short tables and lists, graphs and charts, too."""
+    """Also short tables and lists, graphs and charts."""
 
 
 @dataclass(frozen=True)
@@ -30,35 +30,34 @@ class Metric:
     title: str
     """A few words for a person, as ``error rate``."""
     formula: str
-    """In ``TP``, ``TN``, ``FP``, ``FN`` and ``N``."""
+    """Formula in ``TP``, ``TN``, ``FP``, ``FN`` and ``N``."""
     function: Callable[[Counts], float]
-    """Computes it of a frame's counts, and elementwise where each count is an array. Undefined is
-    NaN, as `ratio` does it.
-    """
+    """Computes it from a frame's counts, or elementwise if each count is an array; NaN if it is
+    undefined, see `ratio`."""
     higher_is_better: bool
     """The direction of improvement."""
     order: int
     """Its place among the columns; the paper's metrics bear their equations' numbers."""
     rank: int = 10
-    """Its place where people read it, the lowest first; of equal ones by ``order``."""
+    """Its place where people read it, the lowest first; equal ones are ranked by ``order``."""
     meaning: str = ""
-    """What it counts, in plain words; empty where the title says it."""
+    """Plain words for what it counts; empty if the title says it."""
     unit: str = "fraction"
-    """Of the value in tables."""
+    """Unit of the value in tables."""
     shown: Shown = Shown.EVERYWHERE
-    """Where people see it; one that mirrors another, as ``TPR = 1 - FNR``, in files alone."""
+    """Places where people see it; a mirror of another, as ``TPR = 1 - FNR``, is in files only."""
     tabled: bool = True
-    """Whether it is a column of the tables. One that is not is computed of sums alone."""
+    """Whether it is a column of the tables; if not, it is computed from sums only."""
 
     @property
     def in_words(self) -> str:
-        """What it counts, or else its title."""
+        """Its meaning, or else its title."""
         return self.meaning or self.title
 
 
-def ratio(part: int, whole: int) -> float:
-    """Divide; where the denominator is 0 the ratio is undefined: NaN, never 0 or 1."""
+def ratio(part: int, total: int) -> float:
+    """Divide; a ratio with denominator 0 is undefined: NaN, never 0 or 1."""
     try:
-        return part / whole  # arrays divide nothing by nothing to NaN by themselves
+        return part / total  # for arrays, NumPy gives NaN for 0 / 0
     except ZeroDivisionError:
         return math.nan

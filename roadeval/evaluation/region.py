@@ -1,4 +1,4 @@
-"""Regions: sets of pixels that are counted apart, found in every labelled frame."""
+"""Regions: sets of pixels that are counted apart in every labelled frame."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from roadeval.kernels import KERNELS
 
 
 class LabelledFrame(NamedTuple):
-    """The input of a region: a frame, its packed truth, and what the variants made of it."""
+    """The input of a region: a frame, its packed truth, and the variants' results."""
 
     frame: Frame
     truth: TruthBits
     variants: tuple[VariantResult, ...]
     settings: EvaluationSettings
     survey: Survey | None = None
-    """The places of its pixels on the ground; None where the camera is not known."""
+    """The places of its pixels on the ground; None if the camera is not known."""
 
 
 class Region(NamedTuple):
-    """A region, or several that are found together."""
+    """A region, or several that are computed together."""
 
     titles: Mapping[str, str] | Callable[[Collection[str], int], Mapping[str, str]]
-    """A few words for a person by name, as ``true_shadow`` in the column ``region``, in order.
+    """A title for people by name, which is a value of the column ``region``; in order.
 
-    Where titles depend on the drive: a function that returns those of some names, given the
-    images' height in pixels, 0 if it is not known.
+    If titles depend on the drive, it is a function that returns the titles of some names, given
+    the images' height in pixels, or 0 if it is not known.
     """
     order: int
     """Its place among the regions."""
     find: Callable[[LabelledFrame], Mapping[str, Bits]]
-    """Computes the regions, ``(H, words)`` each, by name; without those that the frame lacks."""
+    """Computes the regions that a frame has, ``(H, words)`` each, by name."""
 
-    def titled(self, names: Collection[str], height: int = 0) -> Mapping[str, str]:
-        """Return the titles of those of some names that are its own, in order."""
+    def titles_of(self, names: Collection[str], height: int = 0) -> Mapping[str, str]:
+        """Return the titles of some names, as far as it has them, in order."""
         if callable(self.titles):
             return self.titles(names, height)
         return {name: title for name, title in self.titles.items() if name in names}

@@ -9,20 +9,20 @@ from pydantic.dataclasses import dataclass
 FAILED_ERR: Final = 0.25
 """A frame with at least this ERR has failed: a quarter of its pixels are wrong."""
 FAILED_FNR: Final = 0.9
-"""A frame with at least this FNR has failed, however little road there is: next to nothing of the
+"""A frame with at least this FNR has failed, however little road there is: almost nothing of the
 road was found."""
 DEGRADED_ERR: Final = 0.15
-"""A frame with at least this ERR is degraded. The ``blind`` baseline makes about half of it on an
+"""A frame with at least this ERR is degraded. The ``blind`` baseline reaches about half of it on an
 ordinary street."""
 DEGRADED_MARGIN: Final = 0.02
-"""A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not looking
-at the image would have been better."""
+"""A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: ignoring the image
+would have been better."""
 NOTEWORTHY: Final = 0.05
 """The least change of ERR by the filter, or excess over ``blind``, that is noted."""
 
 
 MOST_CELLS: Final = 4_000_000
-"""Of the ground seen from above: a frame's cells are held for each stance of the camera."""
+"""Greatest number of cells of the ground seen from above, which each stance of the camera holds."""
 Metres = Annotated[int, Field(ge=0, le=500)]
 
 
@@ -38,10 +38,9 @@ class EvaluationSettings:
     bands: Annotated[int, Field(ge=1, le=50)] = 5
     """Equal stripes of image rows, ``band_0`` at the top: how far away an error lies."""
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
-    """Of the interval around a difference."""
+    """Confidence of the interval around a difference."""
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
-    """Frames that an interval needs. Fewer say almost nothing of how alike neighbours are, so
-    none is given."""
+    """Frames that an interval needs. Fewer tell almost nothing about how alike neighbours are."""
     distances: Annotated[tuple[Metres, ...], Field(min_length=2, max_length=20)] = (
         0,
         10,
@@ -49,15 +48,15 @@ class EvaluationSettings:
         40,
         80,
     )
-    """Metres ahead between which errors are counted apart, of a camera that is known."""
+    """Metres ahead between which errors are counted apart, for a known camera."""
     edges_at: Annotated[tuple[Metres, ...], Field(max_length=20)] = (5, 10, 20, 40)
     """Metres ahead at which the road's left and right edges are measured."""
     plan: tuple[Metres, Metres] = (6, 46)
     """Metres ahead of the ground that is seen from above, as in KITTI's road benchmark."""
     plan_width: Annotated[float, Field(gt=0, le=200)] = 20.0
-    """Metres across of it; edges farther to the side than half of it are not looked for."""
+    """Its width in metres; edges farther to the side than half of it are not searched."""
     plan_cell: Annotated[float, Field(ge=0.01, le=1)] = 0.05
-    """Metres of its cells' sides, each of which counts once."""
+    """Side of its cells in metres; each cell counts once."""
 
     def __post_init__(self) -> None:
         for name in ("distances", "plan"):

@@ -1,7 +1,7 @@
 """Tables of counted masks, summed up: totals, windows, pairs, worst frames. A table is a DataFrame.
 
-The rows of `roadeval.results.schema.TABLES` of one drive, or of any number: what is kept apart is
-named by columns, such as `KEY` and `MASK`, and everything follows from the four counts of a row.
+Rows are those of `roadeval.results.schema.TABLES`, of one drive or of any number. Columns such as
+`KEY` and `MASK` name what is summed up apart, and all follows from the four counts of a row.
 """
 
 from __future__ import annotations
@@ -25,69 +25,76 @@ KEY: Final = ["drive", "camera"]
 MASK: Final = ["variant", "stage"]
 COUNTS: Final = [*OUTCOMES]
 FILTER: Final = "filter"
-"""The part of an error rate that the filter caused, beside the stages'."""
+"""The part of an error rate that the filter caused, beside the parts of the stages."""
 
 
-def grouped(table: pd.DataFrame, by: Sequence[str]) -> Any:
+def group_rows(table: pd.DataFrame, by: Sequence[str]) -> Any:
     """Group rows by columns, in the order in which the groups first occur, as pandas does."""
     return table.groupby([*by], sort=False, observed=True)
 
 
 def joined(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """Return tables one below the other; names are categoricals in all, as in each."""
+    """Concatenate tables; a column is a categorical if it is one in any of them."""
     import pandas as pd
     from pandas.api.types import union_categoricals
 
     parts = [*tables]
-    whole = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+    filled = [part for part in parts if len(part)]
+    table = pd.concat(filled or parts[:1], ignore_index=True)
     words = {n: None for part in parts for n in part.columns[part.dtypes == "category"]}
-    for name in words if len(whole) else ():
-        columns = [part[name].astype("str").astype("category") for part in parts if len(part)]
-        whole[name] = union_categoricals(columns)
-    return whole
+    for name in words if filled else ():
+        columns = [part[name].astype("str").astype("category") for part in filled]
+        table[name] = union_categoricals(columns)
+    return table
 
 
 def only(table: pd.DataFrame, **values: Any) -> pd.DataFrame:
-    """Return the rows that have a value in each of some columns."""
+    """Return the rows whose columns have the given values."""
     chosen = np.ones(len(table), bool)
     for name, value in values.items():
         chosen &= (table[name] == value).to_numpy()
     return table[chosen]
 
 
+def keys_of(table: pd.DataFrame) -> tuple[list[tuple[str, str]], Sums]:
+    """Return the distinct drives and cameras of a table, and each row's place in that list."""
+    keys = table[KEY].drop_duplicates().astype("str")
+    return [*keys.itertuples(index=False, name=None)], group_rows(table, KEY).ngroup().to_numpy()
+
+
 def values_of(table: pd.DataFrame, column: str) -> list[Any]:
-    """Return the values of a column, each once, in the order in which they first occur."""
+    """Return the distinct values of a column, in the order in which they first occur."""
     values: list[Any] = table[column].unique().tolist()
     return values
 
 
 def rates_of(
     table: pd.DataFrame,
-    wanted: Mapping[str, Metric] = metrics.ALL,
+    by_name: Mapping[str, Metric] = metrics.ALL,
     prefix: str = "",
     end: str = "",
 ) -> pd.DataFrame:
-    """Compute metrics of each row's counts: a column each; NaN where a metric is undefined.
+    """Compute a column for each metric from each row's counts; NaN if it is undefined.
 
-    With ``end`` they are of the counts in columns such as ``TP_base``, and end alike.
+    With ``end`` the columns of counts end so, as ``TP_base`` does, and so do those of metrics.
     """
     import pandas as pd
 
     counts = table[[f"{name}{end}" for name in COUNTS]].to_numpy(np.int64)
-    names = [f"{prefix}{name}{end}" for name in wanted]
-    return pd.DataFrame(metrics.table(counts, wanted), table.index, names)
+    names = [f"{prefix}{name}{end}" for name in by_name]
+    return pd.DataFrame(metrics.table(counts, by_name), table.index, names)
 
 
 def totals(frames: pd.DataFrame, by: Sequence[str] = MASK) -> pd.DataFrame:
-    """Sum up rows of frames, a row for each value of the columns ``by``, which are its index.
+    """Sum up rows of frames: a row for each value of the columns ``by``, which are its index.
 
-    Returned are ``frames``, the summed counts and ``N``; each metric as the mean of the frames'
-    (the paper's average), where it is defined; ``pooled_<metric>`` of the summed counts, and
-    ``undefined_<metric>``, the frames on which it is undefined.
+    Columns are ``frames``, the summed counts and ``N``; each metric as the mean over the frames on
+    which it is defined (the paper's average); ``pooled_<metric>``, computed from the summed counts;
+    and ``undefined_<metric>``, the number of frames on which it is undefined.
     """
     import pandas as pd
 
-    sums = grouped(frames, by)[COUNTS].sum()
+    sums = group_rows(frames, by)[COUNTS].sum()
     rates = rates_of(frames).groupby([frames[name] for name in by], sort=False, observed=True)
     sizes = rates.size()
     return pd.concat(
@@ -117,7 +124,7 @@ def as_trees(sums: pd.DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def over_cameras(sums: pd.DataFrame) -> pd.DataFrame:
-    """Return `totals` of each camera's masks together, by mask: means of the cameras' means."""
+    """Return the totals of all cameras from `totals` by camera: means are of the cameras' means."""
     by_mask = sums.groupby(MASK, sort=False, observed=True)
     undefined = [f"undefined_{name}" for name in metrics.ALL]
     added = by_mask[["frames", *COUNTS, "N", *undefined]].sum()
@@ -128,12 +135,12 @@ def over_cameras(sums: pd.DataFrame) -> pd.DataFrame:
 def windows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
     """Cut each camera's frames into windows of ``size`` that follow each other.
 
-    Returned are the rows of ``windows.csv``, by window and then mask. Frames are evaluated where
-    any of the masks is; of windows with fewer than ``size`` the last is one.
+    Returned are the rows of ``windows.csv``, by window and then mask. Frames count if any of the
+    masks is evaluated there; the last window may have fewer than ``size`` frames.
     """
-    rank = grouped(frames, KEY)["frame"].rank("dense").astype(np.int64)
+    rank = group_rows(frames, KEY)["frame"].rank("dense").astype(np.int64)
     cut = frames.assign(window=(rank - 1) // size)
-    spans = grouped(cut, [*KEY, "window"])["frame"].agg(first_frame="min", last_frame="max")
+    spans = group_rows(cut, [*KEY, "window"])["frame"].agg(first_frame="min", last_frame="max")
     rows = totals(cut, [*KEY, "window", *MASK]).join(spans).reset_index()
     names = [*KEY, "window", "first_frame", "last_frame", "frames", *MASK, *METRICS]
     names += [f"pooled_{name}" for name in METRICS]
@@ -145,9 +152,9 @@ def windows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
 
 
 def masks_of(table: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return variant and stage of each mask, by variant in the table's order, then as stages ran.
+    """Return variant and stage of each mask: variants in the table's order, stages as they ran.
 
-    The table's order is that of its categories, where variants are categoricals.
+    The order of variants is that of their categories, if they are categoricals.
     """
     masks = table[MASK].drop_duplicates()
     if masks["variant"].dtype == "category":
@@ -156,7 +163,7 @@ def masks_of(table: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def final_stages(masks: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Return each variant's final stage: ``post``, or the last that it has.
+    """Return each variant's final stage: ``post``, else its last one.
 
     ``masks`` are in the order in which the stages ran.
     """
@@ -168,9 +175,9 @@ def final_stages(masks: Iterable[tuple[str, str]]) -> dict[str, str]:
 
 
 def is_final(table: pd.DataFrame) -> Flags:
-    """Return of which rows the mask is the final one of its variant on its drive, ``(n,)``."""
+    """Return ``(n,)`` whether each row's mask is the final one of its variant on its drive."""
     by = [name for name in (*KEY, "variant") if name in table]
-    mask = grouped(table, [*by, "stage"]).ngroup().to_numpy()
+    mask = group_rows(table, [*by, "stage"]).ngroup().to_numpy()
     _, first = np.unique(mask, return_index=True)
     masks = table.iloc[first]
     is_post = masks["stage"] == FINAL_STAGE
@@ -184,27 +191,27 @@ def finals(table: pd.DataFrame) -> pd.DataFrame:
     return table[is_final(table)]
 
 
-def paired(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
-    """Return the rows that two tables have in common, by the columns ``on``, in the base's order.
+def pair_rows(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
+    """Return the rows that two tables share by the columns ``on``, in the base's order.
 
-    Rows that are equal in these are matched in their order. The base's other columns end in
+    Rows that are equal in these columns are matched in their order. The base's other columns end in
     ``_base``.
     """
     tables = []
     for table in (base, new):
         words = {name: table[name].astype(str) for name in on if table[name].dtype == "category"}
-        tables.append(table.assign(**words, nth=grouped(table, on).cumcount()))
+        tables.append(table.assign(**words, nth=group_rows(table, on).cumcount()))
     pairs = tables[0].merge(tables[1], on=[*on, "nth"], suffixes=("_base", ""))
     return pairs.drop(columns="nth")
 
 
 def scene_ns(stamps: pd.Series[int]) -> int:
-    """Return how far apart frames of two scenes are: a quarter of the drive, at most 3 seconds."""
+    """Return the least time between two scenes: a quarter of the drive, at most 3 seconds."""
     return min(int(np.ptp(stamps)) // 4, 3_000_000_000) if len(stamps) else 0
 
 
 def near_ns(stamps: pd.Series[int] | Sums) -> int:
-    """Return how far apart frames are that are no neighbours: a 30th of the drive, at most 1 s."""
+    """Return the least time between frames apart: a 30th of the drive, at most 1 second."""
     return min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
 
 
@@ -213,15 +220,15 @@ def worst(
 ) -> pd.DataFrame:
     """Return at most ``count`` rows with the highest value of a column, the worst first.
 
-    Neighbours fail alike, so of frames less than ``apart_ns`` apart, by default `near_ns`, only the
-    worst is there. Rows without a value are none.
+    Neighbours fail alike, so only the worst of frames less than ``apart_ns`` apart is returned; the
+    default is `near_ns`. Rows without a value are left out.
     """
-    known = frames[frames[by].notna()]
-    ranked = np.argsort(-known[by].to_numpy(), kind="stable")
-    return known.iloc[separate(known["stamp_ns"].to_numpy(), ranked, count, apart_ns)]
+    frames = frames[frames[by].notna()]
+    ranked = np.argsort(-frames[by].to_numpy(), kind="stable")
+    return frames.iloc[separate(frames["stamp_ns"].to_numpy(), ranked, count, apart_ns)]
 
 
-def most_changed(
+def most_changed_frames(
     pairs: pd.DataFrame,
     count: int,
     *,
@@ -229,10 +236,10 @@ def most_changed(
     apart_ns: int | None = None,
     besides: Sequence[int] = (),
 ) -> pd.DataFrame:
-    """Return the rows whose ``change`` rose most (``harmed``) or fell most.
+    """Return the rows whose ``change`` is the greatest rise (``harmed``) or the greatest fall.
 
-    Only frames that did rise, or fall, and of neighbours only one, as in `worst`; none that is a
-    neighbour of the stamps ``besides``.
+    Frames that do not rise, or fall, are left out; so are neighbours, as in `worst`, also those of
+    the stamps ``besides``.
     """
     rise = (1 if harmed else -1) * pairs["change"].to_numpy()
     ranked = np.argsort(-rise, kind="stable")
@@ -243,7 +250,7 @@ def most_changed(
 def separate(
     stamps: Sums, ranked: Sums, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
 ) -> Sums:
-    """Return the first ``count`` places of a ranking that are no neighbours of one before."""
+    """Return the first ``count`` places of a ranking that are not neighbours of an earlier one."""
     if apart_ns is None:
         apart_ns = near_ns(stamps)
     places: list[int] = []
@@ -259,23 +266,22 @@ def separate(
 def changes(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
     """Subtract two variants' final masks frame by frame, ``treated`` minus ``control``.
 
-    Returned are the treated variant's rows with ``change`` of `TESTED` and ``wrong``, the net
-    change of wrong pixels; the other's columns end in ``_base``.
+    Returned are the treated variant's rows with ``change``, of `TESTED`, and ``wrong``, the net
+    change of wrong pixels; columns of the control end in ``_base``.
     """
     last = finals(frames)
-    pairs = paired(only(last, variant=control), only(last, variant=treated), [*KEY, "frame"])
+    pairs = pair_rows(only(last, variant=control), only(last, variant=treated), [*KEY, "frame"])
     wrong = pairs["FP"] + pairs["FN"] - pairs["FP_base"] - pairs["FN_base"]
     change = pairs[TESTED] - pairs[f"{TESTED}_base"]
     return pairs.assign(change=change, wrong=wrong).sort_values("frame")
 
 
 def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
-    """Take each frame's error rate apart, stage by stage: a row a frame, a column a part.
+    """Split each frame's error rate into parts: a row for each frame, a column for each part.
 
-    The final mask's ERR is a sum: the ERR of the mask that the final stage was given, as it is
-    without the filter; what the filter changed in that mask (`FILTER`, where both default
-    variants ran); and what the final stage changed. The parts add up to ERR exactly. A variant of
-    one stage has one part.
+    The final mask's ERR is the sum of the ERR of the mask before the final stage, without the
+    filter; the filter's change of that mask (`FILTER`, if both default variants ran); and the final
+    stage's change. The parts add up to ERR exactly. A variant of one stage has one part.
     """
     import pandas as pd
 
@@ -292,47 +298,45 @@ def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
 
 
 def _errors(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return a variant's ERR by frame, a column a stage, in the order they ran."""
-    stages = values_of(rows, "stage")
+    """Return a variant's ERR by frame, a column for each stage, in the order they ran."""
     errors = rows.assign(stage=rows["stage"].astype(str))
-    return errors.pivot_table(TESTED, "frame", "stage", "first", dropna=False)[stages].rename_axis(
-        None, axis=1
-    )
+    by_stage = errors.pivot_table(TESTED, "frame", "stage", "first", dropna=False)
+    return by_stage[values_of(rows, "stage")].rename_axis(None, axis=1)
 
 
 def by_region(rows: pd.DataFrame) -> pd.DataFrame:
-    """Pool the final masks' counts by region and variant, of frames or of drives.
+    """Pool the final masks' counts by region and variant, from rows of frames or of drives.
 
-    Its index are both. Its columns are the rates of short tables, and ``pixels`` and ``errors``:
-    the region's share of all labelled pixels, and of all wrong ones.
+    Region and variant are the index. Columns are the rates of short tables, and ``pixels`` and
+    ``errors``: the region's share of all labelled pixels, and of all wrong ones.
     """
-    sums = grouped(finals(rows), ["region", "variant"])[COUNTS].sum()
+    sums = group_rows(finals(rows), ["region", "variant"])[COUNTS].sum()
     sums = sums.assign(pixels=sums.sum(axis=1), errors=sums["FP"] + sums["FN"])
     regions = sums.index.get_level_values("region")
     halves = sums[regions.isin(HALVES)].groupby("variant", observed=True)[["pixels", "errors"]]
-    whole = halves.sum().reindex(sums.index.get_level_values("variant")).set_axis(sums.index)
-    return rates_of(sums, metrics.SHORT).join(sums[["pixels", "errors"]] / whole)
+    frame = halves.sum().reindex(sums.index.get_level_values("variant")).set_axis(sums.index)
+    return rates_of(sums, metrics.SHORT).join(sums[["pixels", "errors"]] / frame)
 
 
 def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Yield the mean rates of final masks once a stage was replaced by the truth.
+    """Yield the mean rates of final masks when a stage is replaced by the truth.
 
-    Each has ``variant``, ``oracle``, the rates, the ``frames`` that have both masks, and ``as_is``:
-    the ERR on the same frames as it really is.
+    A row has ``variant``, ``oracle``, the rates, the number of ``frames`` that have both masks, and
+    ``as_is``: the ERR on the same frames without the replacement.
     """
     last = finals(frames)
-    for (variant, oracle), rows in grouped(oracles, ["variant", "oracle"]):
+    for (variant, oracle), rows in group_rows(oracles, ["variant", "oracle"]):
         final = rows[rows["stage"] == rows["stage"].iloc[-1]]
-        pairs = paired(only(last, variant=variant), final, [*KEY, "frame"])
+        pairs = pair_rows(only(last, variant=variant), final, [*KEY, "frame"])
         about = {"variant": variant, "oracle": oracle, "frames": len(pairs)}
         rates = {name: float(pairs[name].mean()) for name in METRICS}
         yield {**about, **rates, "as_is": float(pairs[f"{TESTED}_base"].mean())}
 
 
-def merged(chains: Iterable[Iterable[str]]) -> list[str]:
-    """Return the names of several chains in one order, which is that of each chain where it can be.
+def merge_names(chains: Iterable[Iterable[str]]) -> list[str]:
+    """Return the names of several chains in one order that agrees with each chain if possible.
 
-    >>> merged([("similarity", "svm", "post"), ("trees", "post")])
+    >>> merge_names([("similarity", "svm", "post"), ("trees", "post")])
     ['similarity', 'svm', 'trees', 'post']
     """
     names: list[str] = []

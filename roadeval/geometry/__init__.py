@@ -1,1 +1,1 @@
-"""The ground in front of a camera: pixels to metres and back."""
+"""The ground in front of a camera: from pixels to metres and back."""

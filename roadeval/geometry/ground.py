@@ -1,9 +1,9 @@
-"""Flat ground under a camera: where on it a pixel lies, in metres, and where a place is seen.
+"""Flat ground under a camera: from pixels to places on the ground in metres, and back.
 
 Places are ``(n, 2)``: metres ahead of the point of the ground below the camera, in the direction in
 which the camera looks, and metres to the left of that line (REP 103). Pixels are ``(n, 2)``: column
 and row, the centre of the first pixel at (0, 0), as in OpenCV and ROS. The lens is OpenCV's model
-of the same name. Slopes and bumps bend the ground: what is said here then errs.
+of the same name. Slopes and bumps of the ground cause errors.
 """
 
 from __future__ import annotations
@@ -22,29 +22,21 @@ from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
 
-GROUND_FRAMES: Final = ("base_footprint",)
-"""Frames of a vehicle that lie on the ground (REP 120)."""
 COEFFICIENTS: Final = {
     **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (0, 4, 5, 8, 12)),
     **dict.fromkeys(FISHEYE, (4,)),
     **dict.fromkeys(("", "none", "pinhole", "perspective", "undistorted"), (0,)),
     **dict.fromkeys(("brown_conrady", "inverse_brown_conrady", "modified_brown_conrady"), (0,)),
 }
-"""How many numbers the models have, by their names; zeros may follow, or be missing."""
-STATED: Final = (10, 40)
-"""Metres ahead at which it is said how much of the way a pixel covers."""
-LOWEST, HIGHEST = 0.01, 1000.0
-"""Metres of a camera above the ground, at least and at most."""
+"""Possible numbers of coefficients, by the names of models; zeros may follow, or be missing."""
 TOLERANCE: Final = 1e-6
 """A ray must lead back to its pixel within this, in units of the focal length."""
-STEPS: Final = 30
-"""How often a ray is corrected, at most."""
 AXES: Final = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """The rotation from ahead, left and up to a camera's right, down and forward."""
 
 
 class GroundError(RoadevalError):
-    """A camera of which no ground can be made."""
+    """Settings or facts of a camera that make no ground."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +47,14 @@ class Ground:
     height: int
     """Size of its images in pixels."""
     matrix: tuple[float, ...]
-    """Nine numbers, row by row: from a ray's direction to its pixel."""
+    """The 3x3 matrix, row by row, from a ray's direction to its pixel."""
     plane: tuple[float, ...]
-    """Nine numbers: from metres ahead, metres to the left, and 1 to the direction of the ray."""
+    """The 3x3 matrix from metres ahead, metres to the left, and 1 to the direction of the ray."""
     model: str = ""
     distortion: tuple[float, ...] = ()
-    """As many numbers as the model has; a fisheye without any has four zeros."""
+    """The coefficients of the model; four zeros for a fisheye without any."""
     is_posed: bool = True
-    """Whether `plane` is a place and angles, and not only a homography."""
+    """Whether `plane` comes from a place and angles, not only from a homography."""
 
     def scaled(self, width: int, height: int) -> Ground:
         """Return the ground for the same images in another size."""
@@ -72,36 +64,33 @@ class Ground:
         return replace(self, width=width, height=height, matrix=_flat(matrix))
 
     def pixels(self, places: Matrix) -> Matrix:
-        """Return where places are seen, ``(n, 2)``; NaN where no ray from them meets the lens.
-
-        Pixels may lie outside the image.
-        """
-        rays = _mapped(self.plane, places)
+        """Return the pixels of places, ``(n, 2)``, also outside the image; NaN if not seen."""
+        rays = _apply(self.plane, places)
         if self.distortion:
-            # A polynomial that folds bends rays from far outside the picture back into it.
+            # A folding polynomial bends rays from far outside the picture back into it.
             rays[~(np.hypot(*rays.T) <= self._curve[0][-1])] = np.nan
-            rays = _bent(rays, self.model, self.distortion)
-        return _mapped(self.matrix, rays)
+            rays = _distort(rays, self.model, self.distortion)
+        return _apply(self.matrix, rays)
 
     def places(self, pixels: Matrix) -> Matrix:
-        """Return where on the ground pixels lie, ``(n, 2)``; NaN from the horizon upwards."""
+        """Return the places of pixels on the ground, ``(n, 2)``; NaN at and above the horizon."""
         return self.places_of(self.rays(pixels))
 
     def places_of(self, rays: Matrix) -> Matrix:
-        """Return where on the ground some `rays` end, ``(n, 2)``; NaN from the horizon upwards."""
-        return _mapped(_inverse(self.plane), rays)
+        """Return the places of `rays` on the ground, ``(n, 2)``; NaN at and above the horizon."""
+        return _apply(_inverse(self.plane), rays)
 
     def pixel_at(self, ahead: float) -> tuple[float, float]:
-        """Return how many metres a pixel covers straight ahead: along, and across; NaN unseen."""
+        """Return the metres, along and across, that a pixel straight ahead covers, or NaN."""
         (at,) = self.pixels(np.array([[ahead, 0.0]]))
         steps = np.array([[0, -0.5], [0, 0.5], [-0.5, 0], [0.5, 0]])
         up, down, left, right = self.places(at + steps)
         return float(np.linalg.norm(up - down)), float(np.linalg.norm(right - left))
 
     def moved(self, pitch: float = 0.0, height: float = 0.0) -> Ground:
-        """Return the ground if the camera looked down by more degrees, and were higher by metres.
+        """Return the ground for a camera that looks down by more degrees, and is higher by metres.
 
-        A `GroundError` where its place and angles are not known.
+        A `GroundError` if its place and angles are unknown.
         """
         if not (pitch or height):
             return self
@@ -113,15 +102,15 @@ class Ground:
         return replace(self, plane=_plane(turn @ _rotation(LEFT, pitch).T, at))
 
     def axes(self) -> tuple[Matrix, Floats]:
-        """Return the rotation from ahead, left, up to the camera's axes, and the origin there."""
+        """Return the rotation from ahead, left, up to the camera's axes, and their origin there."""
         first, second, third = np.reshape(self.plane, (3, 3)).T
         return np.stack([first, second, np.cross(first, second)], axis=1), third
 
     @cached_property
     def _curve(self) -> tuple[Floats, Floats]:
-        """Slopes of rays, and the distances from the centre at which they are seen.
+        """Slopes of rays, and the distances of their pixels from the centre.
 
-        It ends where the polynomial folds: from there on two rays would have the same pixel.
+        The curve ends where the polynomial folds: beyond, two rays would have the same pixel.
         """
         slopes = np.tan(np.linspace(0, math.radians(89.9), 10_000))
         seen = slopes * _growth(slopes, self.model, self.distortion)
@@ -132,34 +121,34 @@ class Ground:
     def rays(self, pixels: Matrix) -> Matrix:
         """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down.
 
-        NaN where there is none, or one at more than a right angle to the camera's own.
+        NaN if there is none, or one at more than a right angle to the camera's axis.
         """
-        wanted = _mapped(_inverse(self.matrix), pixels)
+        distorted = _apply(_inverse(self.matrix), pixels)
         if not self.distortion:
-            return wanted
-        slopes, seen = self._curve
-        aim, rays, missed = wanted.copy(), wanted.copy(), np.full(len(wanted), np.inf)
-        unsure = np.arange(len(wanted))
-        for _ in range(STEPS):
-            length = np.hypot(*aim[unsure].T)
-            slope = np.interp(length, seen, slopes, right=np.nan)
-            rays[unsure] = aim[unsure] * (slope / np.where(length > 0, length, 1))[:, None]
-            off = wanted[unsure] - _bent(rays[unsure], self.model, self.distortion)
-            missed[unsure] = np.hypot(*off.T)
-            aim[unsure] += off
-            unsure = unsure[missed[unsure] > TOLERANCE / 1e6]
-        rays[~(missed < TOLERANCE)] = np.nan
+            return distorted
+        slopes, distances = self._curve
+        aim, rays = distorted.copy(), distorted.copy()
+        errors, open_rays = np.full(len(distorted), np.inf), np.arange(len(distorted))
+        for _ in range(30):
+            length = np.hypot(*aim[open_rays].T)
+            slope = np.interp(length, distances, slopes, right=np.nan)
+            rays[open_rays] = aim[open_rays] * (slope / np.where(length > 0, length, 1))[:, None]
+            step = distorted[open_rays] - _distort(rays[open_rays], self.model, self.distortion)
+            errors[open_rays] = np.hypot(*step.T)
+            aim[open_rays] += step
+            open_rays = open_rays[errors[open_rays] > TOLERANCE / 1e6]
+        rays[~(errors < TOLERANCE)] = np.nan
         return rays
 
 
 def _growth(slope: Floats, model: str, distortion: Sequence[float]) -> Floats:
-    """Return by how much a lens moves what is seen along rays from the centre, by their slopes."""
+    """Return the factors by which a lens moves rays away from the centre, by their slopes."""
     if model in FISHEYE:
         angle = np.arctan(slope)
         k1, k2, k3, k4 = (*distortion, *(0.0,) * 4)[:4]
         square = angle**2
-        seen = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
-        return np.divide(seen, slope, out=np.ones_like(slope), where=slope > 0)
+        distance = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
+        return np.divide(distance, slope, out=np.ones_like(slope), where=slope > 0)
     k1, k2, _, _, k3, k4, k5, k6, *_ = (*distortion, *(0.0,) * 8)
     square = slope**2
     over = 1 + square * (k1 + square * (k2 + square * k3))
@@ -167,67 +156,65 @@ def _growth(slope: Floats, model: str, distortion: Sequence[float]) -> Floats:
     return np.divide(over, under, out=np.full_like(over, np.nan), where=under > 0)
 
 
-def _bent(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
-    """Return where a lens of OpenCV's models shows rays, in units of the focal length, ``(n, 2)``.
-
-    ``distortion`` are as many numbers as the model has.
-    """
+def _distort(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
+    """Apply a model with all its coefficients to rays, ``(n, 2)`` in focal lengths."""
     slope = np.hypot(*rays.T)
-    bent = rays * _growth(slope, model, distortion)[:, None]
+    distorted = rays * _growth(slope, model, distortion)[:, None]
     if model in FISHEYE:
-        return bent
+        return distorted
     _, _, p1, p2, *rest = distortion
     s1, s2, s3, s4 = (*rest[4:], *(0.0,) * 4)[:4]
     x, y = rays.T
     square = slope**2
-    bent[:, 0] += 2 * p1 * x * y + p2 * (square + 2 * x * x) + square * (s1 + square * s2)
-    bent[:, 1] += 2 * p2 * x * y + p1 * (square + 2 * y * y) + square * (s3 + square * s4)
-    return bent
+    distorted[:, 0] += 2 * p1 * x * y + p2 * (square + 2 * x * x) + square * (s1 + square * s2)
+    distorted[:, 1] += 2 * p2 * x * y + p1 * (square + 2 * y * y) + square * (s3 + square * s4)
+    return distorted
 
 
 def ground_of(
     logged: Calibration | None, settings: GroundSettings, size: tuple[int, int] | None
 ) -> tuple[Ground | None, str]:
-    """Return the ground of a camera and how it is known, or None and what is missing.
+    """Return the ground of a camera and its source, or None and what is missing.
 
-    ``logged`` is what the log says of the camera, for images of ``size``; ``settings`` replace
-    parts of it. Nothing is assumed but a roll of 0, which is said. Without either the text is
-    empty. A `GroundError` for settings that make no camera.
+    ``logged`` is the calibration in the log, for images of ``size``; ``settings`` replace parts of
+    it. Without both the text is empty. Only a roll of 0 is assumed, which the text says. A
+    `GroundError` if the settings make no camera.
     """
     if size is None or (logged is None and not settings.given):
         return None, ""
-    lens, why = _lens(logged, settings, size)
+    lens, why = _find_lens(logged, settings, size)
     if settings.homography:
-        plane, is_posed, text = _of_homography(settings, lens)
+        plane, is_posed, text = _plane_of_homography(settings, lens)
         width, height = settings.size or size
         lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     elif lens is None:
         return None, f"no metres: {why}"
     else:
-        (above, pitch, roll), text = _pose(logged.mounting if logged else None, settings)
+        (above, pitch, roll), text = _find_pose(logged.mounting if logged else None, settings)
         if above is None or pitch is None:
             return None, f"no metres: {text}"
         turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
         plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
     parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
     ground = Ground(*parts, is_posed=is_posed).scaled(*size)
-    # Places all over the image, its edges included.
+    # Pixels all over the image, up to its edges.
     columns, rows = np.meshgrid(*(np.linspace(0, length - 1, 9) for length in size))
     if not np.isfinite(ground.places(np.column_stack([columns.ravel(), rows.ravel()]))).any():
         return None, "no metres: the camera sees no ground: it looks up"
-    (near, _), (far, _) = (ground.pixel_at(ahead) for ahead in STATED)
-    covers = (
-        f"a pixel covers {near:.2g} m of the way {STATED[0]} m ahead, {far:.2g} m at {STATED[1]}"
-    )
-    doubt = lens.doubt if settings.focal else ""
-    told = f"metres: flat ground, {text}", covers if math.isfinite(near + far) else "", doubt
-    return ground, "; ".join(filter(None, told))
+    (near, _), (far, _) = (ground.pixel_at(ahead) for ahead in (10, 40))
+    remarks = [f"metres: flat ground, {text}"]
+    if math.isfinite(near + far):
+        covers = f"a pixel covers {near:.2g} m of the way 10 m ahead, {far:.2g} m at 40"
+        remarks.append(covers)
+    if settings.focal and lens.doubt:
+        remarks.append(lens.doubt)
+    return ground, "; ".join(remarks)
 
 
-def _lens(
+def _find_lens(
     lens: Calibration | None, settings: GroundSettings, size: tuple[int, int]
 ) -> tuple[Calibration | None, str]:
-    """Return the lens, or None and what is missing of it."""
+    """Return the lens, or None and what is missing for it."""
     width, height = settings.size or size
     focal = settings.focal
     if settings.fov is not None:
@@ -256,32 +243,36 @@ def _lens(
     return replace(lens, model=model, distortion=numbers), ""
 
 
-def _pose(
+def _find_pose(
     mounting: Mounting | None, settings: GroundSettings
 ) -> tuple[tuple[float | None, float | None, float], str]:
-    """Return height, pitch and roll, and where they come from; or None, and what is missing."""
+    """Return height, pitch and roll, and their text; or None, and what is missing."""
     height, pitch, roll = settings.height, settings.pitch, settings.roll
     if mounting is not None:
-        angles = _angles_of(_matrix_of(mounting.rotation) @ AXES)
-        pitch = angles[0] if pitch is None else pitch
-        roll = angles[1] if roll is None else roll
-        if height is None and mounting.parent in GROUND_FRAMES:
+        turn = _rotation_of(mounting.rotation) @ AXES  # its first axis is ahead
+        if pitch is None:
+            pitch = math.degrees(math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0])))
+        if roll is None:
+            roll = math.degrees(math.atan2(turn[2, 1], turn[2, 2]))
+        if (
+            height is None and mounting.parent == "base_footprint"
+        ):  # it lies on the ground (REP 120)
             height = mounting.translation[2]
-    has_no_height = height is None or not LOWEST <= height <= HIGHEST
+    has_no_height = height is None or not 0.01 <= height <= 1000
     if height is None or pitch is None or has_no_height:
         above = f": the log has it above {mounting.parent} alone" if mounting else ""
         above = above if height is None else f": the log says {height:.6g} m"
         missing = [f"the camera's height above the ground{above}"] * has_no_height
         missing += ["its pitch"] * (pitch is None)
         return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
-    # Adding 0 makes 0.0 of what would be read as -0.0.
+    # Adding 0 turns -0.0 into 0.0.
     shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
     way = "up" if pitch < 0 else "down"
     text = f"camera {height:.2f} m above it, pitch {shown[0]} {way}, roll {shown[1]}"
     return (height, pitch, roll or 0.0), text + " (not given)" * (roll is None)
 
 
-def _of_homography(
+def _plane_of_homography(
     settings: GroundSettings, lens: Calibration | None
 ) -> tuple[tuple[float, ...], bool, str]:
     to_ground = np.reshape(settings.homography, (3, 3))
@@ -289,7 +280,7 @@ def _of_homography(
         raise GroundError("`ground.homography` cannot be inverted")
     matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
     plane = np.linalg.inv(to_ground @ matrix)
-    # What is far ahead must lie before the camera, not behind it.
+    # Distant places ahead must lie before the camera, not behind it.
     plane = plane / np.linalg.norm(plane[:, 0]) * (1 if plane[2, 0] > 0 else -1)
     ahead, across, _ = plane.T
     is_square = abs(np.linalg.norm(across) - 1) < 0.05 > abs(ahead @ across)
@@ -297,7 +288,7 @@ def _of_homography(
 
 
 def _plane(turn: Matrix, at: Floats) -> tuple[float, ...]:
-    """Return `Ground.plane` of a rotation into the camera's axes, and of its place."""
+    """Return `Ground.plane` for a rotation into the camera's axes, and the camera's place."""
     return _flat(np.column_stack([turn[:, 0], turn[:, 1], -turn @ at]))
 
 
@@ -306,7 +297,7 @@ AHEAD, LEFT = 0, 1
 
 
 def _rotation(axis: int, degrees: float) -> Matrix:
-    """Return the rotation of ahead, left and up about one: about left, ahead goes down."""
+    """Return the rotation about an axis of ahead, left and up: about left, ahead goes down."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     turn = np.eye(3)
     turn[first, first] = turn[second, second] = math.cos(math.radians(degrees))
@@ -315,13 +306,7 @@ def _rotation(axis: int, degrees: float) -> Matrix:
     return turn
 
 
-def _angles_of(body: Matrix) -> tuple[float, float]:
-    """Return pitch and roll in degrees of a rotation whose first axis is ahead; yaw is left out."""
-    pitch = math.atan2(-body[2, 0], math.hypot(body[0, 0], body[1, 0]))
-    return math.degrees(pitch), math.degrees(math.atan2(body[2, 1], body[2, 2]))
-
-
-def _matrix_of(quaternion: Sequence[float]) -> Matrix:
+def _rotation_of(quaternion: Sequence[float]) -> Matrix:
     """Return the rotation matrix of a unit quaternion x, y, z, w."""
     x, y, z, w = quaternion
     return np.array(
@@ -333,8 +318,8 @@ def _matrix_of(quaternion: Sequence[float]) -> Matrix:
     )
 
 
-def _mapped(matrix: Sequence[float] | Matrix, points: Matrix) -> Matrix:
-    """Map ``(n, 2)`` points of a plane by nine numbers to another; NaN of what lies behind it."""
+def _apply(matrix: Sequence[float] | Matrix, points: Matrix) -> Matrix:
+    """Map ``(n, 2)`` points by a 3x3 homography; NaN for points behind the plane."""
     x, y = points.T
     first, second, third = (a * x + b * y + c for a, b, c in np.reshape(matrix, (3, 3)))
     w = np.where(third > 0, third, np.nan)

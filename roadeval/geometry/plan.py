@@ -1,4 +1,4 @@
-"""The ground seen from above, in square cells."""
+"""A view of the ground from above, in square cells."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roadeval.data.arrays import Matrix, Places
 from roadeval.geometry.ground import Ground
 
 OUTSIDE: Final = -1
-"""The pixel of a place that the picture does not show."""
+"""Stands for the pixel of a place outside the picture."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,7 @@ class Plan:
 
     @cached_property
     def cells(self) -> Places:
-        """The pixel in which each cell's centre lies, ``(rows, columns)``; `OUTSIDE` of none.
-
-        It is its place in a flat image.
-        """
+        """``(rows, columns)`` pixels of the cells' centres in a flat image, or `OUTSIDE`."""
         half = self.width / 2
         ahead = np.arange(self.far - self.cell / 2, self.near, -self.cell)
         left = np.arange(half - self.cell / 2, -half, -self.cell)
@@ -42,17 +39,14 @@ class Plan:
         return pixels_of(self.ground, places.reshape(-1, 2)).reshape(places.shape[:2])
 
     def picture(self, image: npt.NDArray[Any], nothing: int = 0) -> npt.NDArray[Any]:
-        """Return an ``(H, W, ...)`` image as it looks from above, ``nothing`` where it is not seen.
-
-        The nearest pixel is taken.
-        """
+        """Return an image as seen from above, by the nearest pixels; ``nothing`` outside it."""
         picture = image.reshape(-1, *image.shape[2:]).take(self.cells, axis=0)
         picture[self.cells == OUTSIDE] = nothing
         return picture
 
 
 def pixels_of(ground: Ground, places: Matrix) -> Places:
-    """Return the pixel in which each place lies, ``(n,)`` in a flat image; `OUTSIDE` of none."""
+    """Return the pixel of each place, ``(n,)`` indices of a flat image, or `OUTSIDE`."""
     pixels = np.rint(ground.pixels(places))
     size = ground.width, ground.height
     inside = np.all((pixels >= 0) & (pixels < size), axis=1, keepdims=True)

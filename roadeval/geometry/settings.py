@@ -1,4 +1,4 @@
-"""The settings of a camera that the log does not know, or not whole."""
+"""Settings of a camera over the ground, for facts that the log lacks."""
 
 from __future__ import annotations
 
@@ -16,36 +16,35 @@ Pixels = Annotated[int, Interval(ge=1, le=65_536)]
 
 @dataclass(frozen=True)
 class GroundSettings:
-    """The camera over flat ground, where the log does not know it, or to correct what it says.
+    """The camera over flat ground, to complete or correct the facts in the log.
 
-    Each setting replaces what the log has: intrinsics of a CameraInfo or CameraCalibration, height
-    and angles of its static transforms. With intrinsics, height and pitch known, errors are counted
-    in metres, too.
+    Each setting replaces a fact of the log: intrinsics of a CameraInfo or CameraCalibration, height
+    and angles of its static transforms. If intrinsics, height and pitch are known, errors are
+    counted in metres, too.
     """
 
     height: Annotated[float | None, Interval(ge=0.01, le=1000)] = None
     """Metres from the ground to the camera."""
     pitch: Degrees | None = None
-    """Degrees that it looks down; negative ones look up."""
+    """Degrees by which it looks down; negative if it looks up."""
     roll: Annotated[float, Interval(ge=-180, le=180)] | None = None
-    """Degrees that it leans to the right. Default: of the log's transforms, else 0."""
+    """Degrees by which it leans to the right. Default: that of the log's transforms, else 0."""
     fov: Annotated[float | None, Interval(ge=0.5, le=175)] = None
-    """Degrees from the left edge of the image to the right one, of a lens without distortion."""
+    """Degrees from the left edge of the image to the right one, for a lens without distortion."""
     focal: Annotated[tuple[Length, ...], Len(max_length=2)] = ()
     """Focal length in pixels, or two: across and down."""
     centre: Annotated[tuple[Number, ...], Len(max_length=2)] = ()
     """Column and row of the principal point. Default: the middle of the image."""
     size: Annotated[tuple[Pixels, ...], Len(max_length=2)] = ()
-    """Width and height of the images that focal length, centre and homography are for. Default: the
-    log's images."""
+    """Width and height of the images for focal length, centre and homography. Default: the log's
+    images."""
     model: str = ""
-    """Of the distortion: ``plumb_bob``, ``rational_polynomial`` or ``equidistant`` (a fisheye)."""
+    """Distortion model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant`` (a fisheye)."""
     distortion: Annotated[tuple[Number, ...], Len(max_length=14)] = ()
-    """Its coefficients, in the order of ROS and OpenCV."""
+    """Coefficients of the distortion, in the order of ROS and OpenCV."""
     homography: Annotated[tuple[Entry, ...], Len(max_length=9)] = ()
-    """Nine numbers, row by row: from column, row and 1 to metres ahead, metres to the left, and 1
-    (times any factor); of a lens with distortion, from pixels without it. It replaces height, pitch
-    and roll."""
+    """Nine numbers, row by row: from column, row and 1 (in an image without distortion) to metres
+    ahead, metres to the left, and 1, times any factor. It replaces height, pitch and roll."""
 
     def __post_init__(self) -> None:
         if self.fov is not None and self.focal:
@@ -62,5 +61,5 @@ class GroundSettings:
 
     @property
     def given(self) -> bool:
-        """Whether anything is."""
+        """Whether any setting is given."""
         return self != GroundSettings()

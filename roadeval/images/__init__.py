@@ -1,5 +1,5 @@
-"""Image files: from their bytes to arrays. A damaged file is an error, never half a picture.
+"""Decoding of image files to arrays. A damaged file is an error, never half a picture.
 
-No other room decodes them, so that camera, truth, masks and the pictures of a recording are read,
-checked and refused alike.
+No other room decodes image files, so that images of the camera, truth, masks and pictures of a
+recording are read and checked in the same way.
 """

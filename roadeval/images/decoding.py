@@ -1,10 +1,10 @@
 """Decoding of image files.
 
-`simplejpeg` tells of damage that other decoders hide: they fill in what they cannot read. Its
-pixels are those of OpenCV, bit for bit. All other formats are read by Pillow, after the checksums
-of a PNG were verified. Damage that leaves a valid file cannot be known.
+`simplejpeg` reports damage that other decoders hide by filling it in; its pixels are those of
+OpenCV, bit for bit. Pillow reads all other formats, after it verified the checksums of a PNG.
+Damage that leaves a valid file cannot be found.
 
-An image that is to be turned, by its EXIF orientation, is turned where `Limits` say so.
+Images are turned by their EXIF orientation if the `Limits` say so.
 """
 
 from __future__ import annotations
@@ -30,23 +30,19 @@ _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
 _SCAN: Final = b"\xff\xda"
 _TWELVE_BITS: Final = re.compile(rb"\xff[\xc0-\xc2]\x00[\x0b\x11]\x0c", re.DOTALL)
-"""The head of a frame of one or three colours."""
-_DEEP: Final = (b"\x10\2", b"\x10\6")
-"""Bits a sample, and kind, of a PNG of 16 bits with colours, without and with opacity."""
-OPAQUE: Final = 128
-"""Opacity from which a pixel of a mask counts as painted."""
+"""The head of a JPEG frame of one or three colours with 12 bits a sample."""
 MOST_SCANS: Final = 100
-"""Most scans of a JPEG; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
-can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
+"""Most scans of a JPEG, as in libtiff; encoders write about ten. A scan of a few bytes can make the
+decoder walk through the image: 200 kB of scans would take over a minute."""
 
 
 def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
     """Decode an image file to ``(H, W, 3)`` uint8 RGB; ``white`` is that of `eight_bits`.
 
-    Grey fills all channels, and opacity is left out. An `ImageError` if it is damaged, of no known
-    format, or too large.
+    Grey fills all channels, and opacity is left out. An `ImageError` if the file is damaged, of an
+    unknown format, or too large.
     """
-    image = _decoded(data, limits)
+    image = _decode(data, limits)
     if isinstance(image, np.ndarray):
         pixels = image
     elif image.mode in _SAMPLES:
@@ -59,24 +55,22 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
 
 
 def deep_samples(data: File, limits: Limits) -> Array | None:
-    """Return the samples of an image that has more than eight bits; None of any other.
-
-    Errors as of `to_rgb`.
-    """
-    image = _decoded(data, limits)
+    """Return samples of more than eight bits; None for other images. Errors as in `to_rgb`."""
+    image = _decode(data, limits)
     is_grey = not isinstance(image, np.ndarray) and image.mode in _SAMPLES
     samples = _samples(image) if is_grey else _deep_colours(data)
     return None if samples is None or samples.dtype == np.uint8 else samples
 
 
 def _deep_colours(data: File) -> Array | None:
-    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits: Pillow would keep eight of them.
+    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits, of which Pillow would keep eight.
 
-    An `ImageError` if it is damaged. None of any other file.
+    None for any other file. An `ImageError` if it is damaged.
     """
     import cv2
 
-    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in _DEEP:
+    # The bits of a sample, and the kind: colours without and with opacity.
+    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in (b"\x10\2", b"\x10\6"):
         return None
     colours: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if colours is None:
@@ -87,15 +81,14 @@ def _deep_colours(data: File) -> Array | None:
 def to_labels(data: File, limits: Limits) -> Array:
     """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
-    Of a file with a palette these are the palette's indices, or its greys if it has only greys.
-    An image of three equal channels is a label image of one. One of a single colour that is
-    transparent in parts is a mask of its opacity. Errors as of `to_rgb`, and where the opacity of
-    one of several colours would say more than the colour.
+    A file with a palette gives its indices, or its greys if it has no colours. Three equal channels
+    count as one. An image of a single colour that is transparent in parts gives its opacity. Errors
+    as in `to_rgb`, and if one of several colours is transparent in parts.
     """
-    return upright(_values(_decoded(data, limits)), _left_to_turn(data, limits))
+    return upright(_label_values(_decode(data, limits)), _left_to_turn(data, limits))
 
 
-def _values(image: Any) -> Array:
+def _label_values(image: Any) -> Array:
     if isinstance(image, np.ndarray):
         return without_colours(image)
     if image.mode == "P":
@@ -109,12 +102,12 @@ def _values(image: Any) -> Array:
         return samples if samples.dtype.kind != "f" else eight_bits(samples)
     colours = np.array(image.convert("RGB"))
     opacity = np.array(image.getchannel("A")) if image.mode in {"RGBA", "LA"} else np.full(1, 255)
-    clear = opacity < OPAQUE
+    clear = opacity < 128
     if clear.any() and not clear.all():
-        wide = colours.astype(np.uint32) @ np.array([65536, 256, 1], np.uint32)
-        if wide.min() == wide.max():
+        packed = colours.astype(np.uint32) @ np.array([65536, 256, 1], np.uint32)
+        if packed.min() == packed.max():
             return opacity
-        if np.intersect1d(wide[clear], wide[~clear]).size:
+        if np.intersect1d(packed[clear], packed[~clear]).size:
             raise ImageError(
                 "a label image of which one colour is transparent in parts: save it without "
                 "transparency"
@@ -123,11 +116,8 @@ def _values(image: Any) -> Array:
 
 
 def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
-    """Return the ``(H, W)`` uint8 indices of a PNG file with a palette.
-
-    Errors as of `to_rgb`, and if it has no palette.
-    """
-    image = _decoded(data, limits)
+    """Return the ``(H, W)`` uint8 indices of a PNG; an `ImageError` if it has no palette."""
+    image = _decode(data, limits)
     if isinstance(image, np.ndarray) or image.mode != "P":
         raise ImageError("an image without a palette")
     return np.array(image)
@@ -141,9 +131,9 @@ def without_colours(image: Rgb) -> Array:
 
 
 def eight_bits(samples: Array, white: float | None = None) -> npt.NDArray[np.uint8]:
-    """Convert samples of more than eight bits to 0..255, the upper eight of the bits in use.
+    """Convert samples of more than eight bits to 0..255, their upper eight bits.
 
-    ``white`` is the sample that becomes 255: by default the greatest of 16 bits, of floats 1.
+    ``white`` is the sample that becomes 255: by default the greatest of 16 bits, or 1 for floats.
     """
     if samples.dtype.kind == "f":
         scale = np.float32(1 if white is None else 1 / white)
@@ -162,7 +152,7 @@ def _known_format(data: File) -> ImageFormat:
 
 
 def size_of(data: File, limits: Limits) -> tuple[int, int]:
-    """Return width and height of an image file, by its head alone; errors as of `to_rgb`."""
+    """Return width and height of an image file by its head; errors as in `to_rgb`."""
     format_ = _known_format(data)
     if format_.plugin is None:
         width, height = _jpeg_size(data)
@@ -182,21 +172,21 @@ ORIENTATIONS: Final = {
     7: (1, 1, 1),
     8: (1, 1, 0),
 }
-"""What turns an image, by the number that EXIF has for it: whether rows and columns are exchanged,
-then whether the rows, and the columns, run the other way."""
+"""How an image is turned, by EXIF's number: whether rows and columns are exchanged, then whether
+the rows, and the columns, run backwards."""
 _MARKS: Final = (b"Exif\0\0", b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
-"""One of these stands in each file that has an orientation."""
+"""Every file with an orientation contains one of these."""
 
 
 def upright(pixels: Array, orientation: int) -> Array:
-    """Turn an image, or values, as an orientation asks: an array of its own, or the same."""
+    """Return an image, or values, turned by an orientation."""
     exchanged, rows, columns = ORIENTATIONS[orientation]
     turned = pixels.swapaxes(0, 1) if exchanged else pixels
     return np.ascontiguousarray(turned[:: 1 - 2 * rows, :: 1 - 2 * columns])
 
 
 def orientation_of(data: File) -> int:
-    """Return the EXIF orientation of an image file, 1 to 8: 1 where it has none."""
+    """Return the EXIF orientation of an image file, 1 to 8; 1 if it has none."""
     content, format_ = bytes(data), format_of(data)
     if format_ and any(mark in content for mark in _MARKS):
         plugin = format_.plugin or "Jpeg"
@@ -207,7 +197,7 @@ def orientation_of(data: File) -> int:
 
 
 def _left_to_turn(data: File, limits: Limits) -> int:
-    """Return how an image is to be turned after it is decoded: Pillow itself turns a TIFF."""
+    """Return the orientation by which to turn a decoded image; Pillow itself turns a TIFF."""
     format_ = format_of(data)
     if (format_ is not None and format_.plugin == "Tiff") is limits.turn:
         return 1
@@ -215,24 +205,12 @@ def _left_to_turn(data: File, limits: Limits) -> int:
     return orientation if limits.turn else {6: 8, 8: 6}.get(orientation, orientation)
 
 
-def _jpeg(data: File, limits: Limits) -> Rgb:
-    import simplejpeg
-
-    limits.check(*_jpeg_size(data))
-    if bytes(data).count(_SCAN) > MOST_SCANS:
-        raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
-    try:
-        return simplejpeg.decode_jpeg(data, "RGB", strict=True)
-    except ValueError as error:
-        raise _jpeg_error(data, f"a damaged JPEG ({error})") from error
-
-
 def _jpeg_size(data: File) -> tuple[int, int]:
     import simplejpeg
 
     try:
         height, width, *_ = simplejpeg.decode_jpeg_header(data)
-    except (ValueError, KeyError) as error:  # KeyError for a subsampling that has no name
+    except (ValueError, KeyError) as error:  # KeyError for an unknown subsampling
         what = "a JPEG whose head is damaged, or of a rare chroma subsampling"
         raise _jpeg_error(data, what) from error
     return width, height
@@ -243,11 +221,20 @@ def _jpeg_error(data: File, what: str) -> ImageError:
     return ImageError("a JPEG of 12 bits a sample, which is not read: log PNG" if is_deep else what)
 
 
-def _decoded(data: File, limits: Limits) -> Any:
-    """Return the pixels of a JPEG, and a decoded image of Pillow's of any other format."""
+def _decode(data: File, limits: Limits) -> Any:
+    """Return the pixels of a JPEG; for any other format a decoded image of Pillow's."""
     format_ = _known_format(data)
     if format_.plugin is None:
-        return _jpeg(data, limits)
+        import simplejpeg
+
+        limits.check(*_jpeg_size(data))
+        if bytes(data).count(_SCAN) > MOST_SCANS:
+            problem = f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode"
+            raise ImageError(problem)
+        try:
+            return simplejpeg.decode_jpeg(data, "RGB", strict=True)
+        except ValueError as error:
+            raise _jpeg_error(data, f"a damaged JPEG ({error})") from error
     with _damage_in(format_):
         with _opened(data, format_) as image:
             limits.check(*image.size)
@@ -258,7 +245,7 @@ def _decoded(data: File, limits: Limits) -> Any:
 
 
 def _opened(data: File, format_: ImageFormat) -> Any:
-    """Return an image of Pillow's, of which no more than the head is read yet."""
+    """Return an image of Pillow's, of which only the head is read."""
     _silence_pillow()
     module = import_module(f"PIL.{format_.plugin}ImagePlugin")
     return getattr(module, f"{format_.plugin}ImageFile")(io.BytesIO(data))
@@ -266,9 +253,9 @@ def _opened(data: File, format_: ImageFormat) -> Any:
 
 @cache
 def _silence_pillow() -> None:
-    """Keep Pillow and libtiff from printing: Pillow raises what matters, and we name the frame.
+    """Keep Pillow and libtiff from printing: their exceptions are reported with the frame.
 
-    There is no switch for libtiff; where it is not a library of its own, nothing is changed.
+    There is no switch for libtiff; if it is a separate library, nothing is changed.
     """
     import ctypes
     import warnings
@@ -282,7 +269,7 @@ def _silence_pillow() -> None:
 
 @contextmanager
 def _damage_in(format_: ImageFormat) -> Iterator[None]:
-    """Turn whatever Pillow raises on a damaged file into an `ImageError`."""
+    """Turn Pillow's exceptions on a damaged file into an `ImageError`."""
     try:
         yield
     except (ImageError, MemoryError):
@@ -295,7 +282,7 @@ def _damage_in(format_: ImageFormat) -> Iterator[None]:
 def _samples(image: Any) -> Array:
     """Return the numbers of an image, in this machine's byte order."""
     samples = np.array(image)
-    # Pillow holds 16 bits of some formats, and all 32 of others, in 32.
+    # Pillow holds samples of 16 bits in 32 bits for some formats.
     if samples.dtype == np.int32 and 0 <= samples.min() <= samples.max() < 1 << 16:
         samples = samples.astype(np.uint16)
     return samples.astype(samples.dtype.newbyteorder("="), copy=False)

@@ -1,34 +1,33 @@
-"""Formats of image files, told by the files' first bytes, and what is refused."""
+"""Formats of image files, recognised by their first bytes, and limits of their size."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+Size = tuple[int, int]
+"""Width and height in pixels."""
 MAX_PIXELS: Final = 1 << 25
 """Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
 
 
 class ImageError(ValueError):
-    """An image that is damaged, of an unknown format, or too large to be read.
-
-    Its message completes "frame 7: ...".
-    """
+    """An image that is damaged, of an unknown format, or too large; it continues "frame 7: "."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How large an image may be, and how it is taken."""
+    """The largest size of an image, and rules for decoding it."""
 
     max_pixels: int = MAX_PIXELS
-    """Most pixels. An image's own head says how many it has, so none is decoded that has more."""
+    """Most pixels. The head of an image tells its size, so larger ones are not decoded."""
     turn: bool = False
-    """Whether an image whose EXIF orientation says so is turned, as viewers do."""
+    """Whether an image is turned by its EXIF orientation, as in viewers."""
     full_range: bool = False
-    """Whether a video's luma spans 0 to 255, whatever the video says, and not 16 to 235."""
+    """Whether the luma of a video spans 0 to 255, whatever the video states."""
 
     def check(self, width: int, height: int) -> None:
-        """Refuse a size; an `ImageError` if it is empty or too large."""
+        """Raise an `ImageError` if a size is empty or too large."""
         if width <= 0 or height <= 0:
             raise ImageError(f"an image of {width}x{height}")
         if width * height > self.max_pixels:
@@ -39,18 +38,18 @@ class Limits:
 
 
 class ImageFormat(NamedTuple):
-    """A format that is read."""
+    """A format of image files."""
 
     name: str
     skipped: int
     """Bytes before the magic ones."""
     magic: bytes
     plugin: str | None
-    """Name of Pillow's module and class for it; None for JPEG, which another library reads."""
+    """Name of its module and class in Pillow; None for JPEG, which another library reads."""
     media_type: str | None = None
-    """What viewers call it; None for formats that not all of them know."""
+    """Its media type, if all viewers know it."""
     exact: bool = True
-    """Whether it keeps every pixel's value. Of formats that can do both, the answer is no."""
+    """Whether it always keeps the value of every pixel."""
 
 
 FORMATS: Final = (
@@ -66,10 +65,10 @@ FORMATS: Final = (
     ImageFormat("PGM", 0, b"P5", "Ppm"),
     ImageFormat("PPM", 0, b"P6", "Ppm"),
 )
-"""Every format that is read; the first that fits is the file's."""
+"""Every format, in the order in which files are compared with them."""
 
 
 def format_of(data: bytes | memoryview) -> ImageFormat | None:
     """Return the format of a file, None if it is none of these."""
     head = bytes(data[:16])
-    return next((one for one in FORMATS if head.startswith(one.magic, one.skipped)), None)
+    return next((f for f in FORMATS if head.startswith(f.magic, f.skipped)), None)

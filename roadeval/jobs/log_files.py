@@ -115,7 +115,7 @@ def demo(output: AnyPath) -> Path:
     ['/camera/image', '/truth/road', '/truth/shadow']
     """
     path = Path(output)
-    source = next((each for each in _PLACES if each.is_file()), None)
+    source = next((place for place in _PLACES if place.is_file()), None)
     if source is None:
         raise RoadevalError("this installation lacks the demo drive; install roadeval again")
     with holding(path), writing(path, RoadevalError):

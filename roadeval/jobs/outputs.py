@@ -13,12 +13,12 @@ from roadeval.errors import RoadevalError
 from roadeval.recording.layout import RecordRule
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FILES
-from roadeval.results.folder import CONTENT, belonging
+from roadeval.results.folder import CONTENT, names_of_results
 from roadeval.runtime.files import (
     AnyPath,
     claimed_file,
     claimed_folder,
-    own_names,
+    find_partial,
     remove,
     target_of,
 )
@@ -57,10 +57,10 @@ class Outputs:
         """Hold them all, as `holding` does; at the end partial recordings of earlier runs go."""
         with holding(self.recording, self.mcap, folder=self.reports, inputs=inputs) as certain:
             ours = certain and self.recording
-            there = own_names(target_of(ours), hidden=False) if ours else []
+            there = find_partial(target_of(ours), hidden=False) if ours else []
             yield
-            for each in there:
-                remove(each)
+            for partial in there:
+                remove(partial)
 
 
 @contextmanager
@@ -95,7 +95,7 @@ def _places(path: Path) -> Iterator[Path]:
     if is_fleet(path):
         yield from (path / name for name in FILES)
     elif (path / SUMMARY).is_file():
-        yield from (path / name for name in belonging(path / SUMMARY))
+        yield from (path / name for name in names_of_results(path / SUMMARY))
 
 
 def _claim(claims: ExitStack, path: Path, claim: AbstractContextManager[bool]) -> bool:

@@ -1,9 +1,9 @@
 """The compiled kernels, by the names of their twins in `plain`.
 
-The loops are in C, in the folder ``c``, and built when the package is installed. Here what they
-write is allocated, and shapes are checked, a `ValueError` if they do not fit together; an array of
-another type, dimension or order than a loop takes is a `TypeError`. Rows, columns and labels in
-runs are trusted: they are those of `components`, of an image of that size.
+The loops are in C, in the folder ``c``, and built when the package is installed. The functions here
+allocate the arrays that a loop writes, and check shapes, a `ValueError` if they do not fit
+together; an array of another type, dimension or order than a loop takes is a `TypeError`. Rows,
+columns and labels in runs are trusted: they come from `components` of an image of the same size.
 """
 
 from __future__ import annotations
@@ -36,17 +36,15 @@ from roadeval.data.arrays import (
 from roadeval.kernels import _loops, plain
 
 TABLED: Final = 256
-"""As in ``c/compensation.c``: components of more pixels have a table of levels."""
-
+"""Components of more pixels have a table of levels, as in ``c/compensation.c``."""
 COLOUR_WORDS: Final = 1 << 18
-"""Of 64 colours each."""
-
+"""Words of a table over all colours, 64 colours each."""
 BLOCK: Final = 256
-"""As in ``c/trees.c``: pixels at a time."""
+"""Pixels at a time, as in ``c/trees.c``."""
 
 
 def _shape(*arrays: npt.NDArray[Any]) -> tuple[int, ...]:
-    """Return the common shape of arrays that one index walks; a `ValueError` if there is none."""
+    """Return the common shape of arrays; a `ValueError` if there is none."""
     shape = arrays[0].shape
     if any(array.shape != shape for array in arrays):
         raise ValueError(f"arrays of different shapes: {[array.shape for array in arrays]}")
@@ -54,7 +52,7 @@ def _shape(*arrays: npt.NDArray[Any]) -> tuple[int, ...]:
 
 
 def _require(array: npt.NDArray[Any], *shape: int) -> None:
-    """Refuse an array of another shape than a loop walks; a `ValueError`."""
+    """Raise a `ValueError` if an array has another shape."""
     if array.shape != shape:
         raise ValueError(f"an array of shape {array.shape}, not {shape}")
 
@@ -97,7 +95,6 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 
 
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
-    """See `plain.ring_sums`."""
     _require(runs, len(runs), 4)
     height, columns = _shape(*planes)
     _require(ring, height, -(-columns // 64))
@@ -110,7 +107,6 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
 
 
 def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
-    """See `plain.transfer`."""
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)
@@ -132,10 +128,10 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 
 def keep_region(bits: Bits, width: int) -> Bits:
-    room, kept = _room_for_runs(bits, width), np.zeros_like(bits)
+    room, region = _room_for_runs(bits, width), np.zeros_like(bits)
     votes = np.zeros_like(room[3])
-    _loops.keep_region(bits, len(bits), width, *room, votes, kept)
-    return kept
+    _loops.keep_region(bits, len(bits), width, *room, votes, region)
+    return region
 
 
 def fill_holes(bits: Bits, width: int) -> Bits:
@@ -160,7 +156,7 @@ def _room_for_runs(bits: Bits, width: int) -> tuple[npt.NDArray[Any], ...]:
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     _, words = _shape(masks[:0], classes[:0], regions[:0])
     counts = np.empty((len(masks), len(classes), len(regions)), np.int64)
-    sized = [given for each in (masks, classes, regions) for given in (each, len(each))]
+    sized = masks, len(masks), classes, len(classes), regions, len(regions)
     _loops.count_bits(*sized, words, counts, np.empty(words, np.uint64))
     return counts
 
@@ -192,15 +188,14 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 
 
 def tree_sum(
-    features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
+    features: Values, feature: Indices, threshold: Values, leaves: Masks, values: Values
 ) -> Values:
-    """See `plain.tree_sum`."""
     count, pixels = features.shape
-    trees, nodes = _shape(feature, threshold, kept)
+    trees, nodes = _shape(feature, threshold, leaves)
     _require(values, trees, plain.LEAVES)
     result, block = np.empty(pixels, np.float32), np.zeros(count * BLOCK, np.float32)
     sized = features, count, pixels
-    _loops.tree_sum(*sized, feature, threshold, kept, values, trees, nodes, block, result)
+    _loops.tree_sum(*sized, feature, threshold, leaves, values, trees, nodes, block, result)
     return result
 
 
@@ -222,9 +217,9 @@ def label_rows(labels: Plane, bits: int) -> Plane:
 
 LOOPS: Final = [
     name
-    for name, each in vars().items()
-    if isfunction(each) and each.__module__ == __name__ and name[0] != "_"
+    for name, value in vars().items()
+    if isfunction(value) and value.__module__ == __name__ and name[0] != "_"
 ]
 if lacking := [name for name in LOOPS if not hasattr(_loops, name)]:
-    # A checkout that was updated, and not installed again since.
+    # The checkout was updated, and not installed again since.
     raise ImportError(f"the compiled loops are of an earlier state: no {', '.join(lacking)}")

@@ -1,6 +1,6 @@
-"""The kernels as NumPy and OpenCV expressions: their definition, and used where none compile.
+"""The kernels as NumPy and OpenCV expressions: their definition, and a fallback without a compiler.
 
-The sections are those of the C files in the folder ``c``.
+Each section is a C file in the folder ``c``.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from roadeval.data.arrays import (
 )
 
 _AROUND: Final[dict[str, Any]] = {"borderType": cv2.BORDER_CONSTANT, "borderValue": 0}
-"""Nothing is set around a mask."""
+"""No bit is set around a mask."""
 FAR: Final = 1 << 30
-"""Distance of what no path reaches; no distance is greater."""
+"""Distance of pixels that no path reaches; no distance is greater."""
 STRAIGHT: Final = 5
 ASLANT: Final = 7
 """Length of a step to a neighbour by a side and by a corner: 7/5 is the root of 2, less 1 %."""
 LABEL_BITS: Final = (2, 4, 8)
-"""Those that a label of a PNG file may have here; with one it is a mask."""
+"""Bits that a label of a PNG file may have here; with one bit it is a mask."""
 LEAVES: Final = 32
-"""Of a tree, at most."""
+"""Greatest number of leaves of a tree."""
 
 
 # --- Colours of pixels: looked up in tables, and their distance from a mean (Eq. 2) ---------------
@@ -62,12 +62,12 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
 def mahalanobis(
     planes: Planes, mean: Vector, whitening: Matrix, greatest: float
 ) -> tuple[Values, Plane]:
-    """Distance of Eq. 2, ``|W (x - m)|``, of every pixel.
+    """Compute the distance of Eq. 2, ``|W (x - m)|``, of every pixel.
 
     ``planes`` are red, green and blue, ``(H, W)`` uint8 each; ``mean`` is m, ``(3,)``, a colour in
     0..255, and ``whitening`` W, ``(3, 3)`` lower triangular: ``W^T W`` is the inverse covariance.
-    ``greatest`` is that of the square, up to which a pixel is near: a finite number. Returned are
-    the distance, ``(H, W)`` float32, computed in that precision, and ``(H, W)`` uint8, 1 near and 0
+    ``greatest`` is the greatest squared distance of a near pixel, a finite number. Returned are the
+    distance, ``(H, W)`` float32, computed in that precision, and ``(H, W)`` uint8, 1 near and 0
     far, decided in float64.
     """
     near = _squared(planes, mean, whitening) <= greatest
@@ -88,10 +88,10 @@ def _squared(planes: Planes, mean: Values, whitening: Values) -> Values:
 def look_up_colours(planes: Planes, road: Words) -> Plane:
     """Look every pixel up in a table over all colours, a bit each.
 
-    ``planes`` are red, green and blue, ``(H, W)`` uint8 each. ``road`` is ``(2^18,)`` uint64 by the
-    upper six bits of red, green and blue; of a word's bits the lower two of each tell which:
-    similar colours, as an image has them side by side, share it. Returned are the bits, ``(H, W)``
-    uint8.
+    ``planes`` are red, green and blue, ``(H, W)`` uint8 each. ``road`` is ``(2^18,)`` uint64, a
+    word for the upper six bits of red, green and blue, with a bit for the lower two of each:
+    similar colours, which neighbours in an image have, share a word. Returned are the bits,
+    ``(H, W)`` uint8.
     """
     r, g, b = (plane.astype(np.int64) for plane in planes)
     word = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
@@ -103,7 +103,7 @@ def look_up_colours(planes: Planes, road: Words) -> Plane:
 
 
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
-    """Count pixels in a mask, of a class and in a region: the set bits of three words' conjunction.
+    """Count the pixels of a class in a mask and in a region, for all combinations of these.
 
     ``masks``, ``classes`` and ``regions`` are ``(M, n)``, ``(C, n)`` and ``(R, n)`` uint64; the
     counts are ``(M, C, R)`` int64.
@@ -147,10 +147,10 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """Sum the colours of every component's buffer ring (Eq. 10).
 
-    ``planes``, ``runs`` and ``count`` are those of `run_sums`. ``ring`` is ``(H, words)``: the
-    pixels outside the shadow that some dilation reaches. ``width`` is the number of 3x3 dilations:
-    a ring pixel lies within this Chebyshev distance. Returned are ``(count, 7)`` int64, as by
-    `run_sums`; a pixel counts once in each component that reaches it.
+    ``planes``, ``runs`` and ``count`` are as in `run_sums`. ``ring`` is ``(H, words)``: the pixels
+    outside the shadow that some dilation reaches. ``width`` is the number of 3x3 dilations: a ring
+    pixel lies within this Chebyshev distance. Returned are ``(count, 7)`` int64, as in `run_sums`;
+    a pixel counts once in each component that reaches it.
     """
     height, columns = planes[0].shape
     label, pixel = ring_pairs(paint(runs, height, columns), unpack(ring, columns), width)
@@ -160,8 +160,8 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
 def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     """Return every ``(component, pixel)`` where the pixel lies in the component's ring (Eq. 10).
 
-    ``labels`` and ``ring`` are ``(H, W)``, ``width`` as of `ring_sums`. Pixels are flat indices; a
-    pixel near two components occurs with both.
+    ``labels`` and ``ring`` are ``(H, W)``, ``width`` is as in `ring_sums`. Pixels are flat indices;
+    a pixel near two components occurs with both.
     """
     pixel = np.flatnonzero(ring)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(labels, width), [2 * width + 1] * 2)
@@ -169,8 +169,8 @@ def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     for row in range(2 * width + 1):  # together the repetitions of a wide ring take much memory
         near = windows[y, x, row]
         inside = near > 0
-        found = near[inside].astype(np.int64) * labels.size + pixel[np.nonzero(inside)[0]]
-        keys = np.unique(np.concatenate([keys, found]))
+        more = near[inside].astype(np.int64) * labels.size + pixel[np.nonzero(inside)[0]]
+        keys = np.unique(np.concatenate([keys, more]))
     return keys // labels.size, keys % labels.size
 
 
@@ -185,8 +185,9 @@ def _sums(labels: Places, colours: Plane, count: int) -> Sums:
 def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
     """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
 
-    ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` ``(count, 3)``
-    float64, by label and channel. Returns ``(H, W, 3)`` uint8, elsewhere as it was.
+    ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` are
+    ``(count, 3)`` float64, by label and channel. Returns ``(H, W, 3)`` uint8; other pixels stay
+    unchanged.
     """
     result = image.copy()
     y, x, k = _run_pixels(runs)
@@ -203,11 +204,11 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 
     A path goes from neighbour to neighbour, by sides and corners. A step costs the sum of its two
     pixels' costs times `STRAIGHT` or `ASLANT`: ten times the integral of the cost along it [1]_.
-    Rows are swept up and down by turns, paths within a row included, as raster scans do [2]_: a
-    path that turns back up or down more often than there are ``rounds`` may be missed for a dearer
-    one. Whole numbers make the order of sums irrelevant. ``cost`` is ``(H, W)`` uint16: of a step
-    of length 1. ``seeds`` are ``(H, W)`` uint8, nonzero where paths begin; a round is a sweep up
-    and one down. Returned are ``(H, W)`` int32, at most `FAR`.
+    Rows are swept up and down in turn, paths within a row included, as raster scans do [2]_: a path
+    that turns back up or down more than ``rounds`` times may be missed for a dearer one. Integers
+    make the order of sums irrelevant. ``cost`` is ``(H, W)`` uint16, for a step of length 1.
+    ``seeds`` are ``(H, W)`` uint8, nonzero where paths begin; a round is a sweep up and a sweep
+    down. Returned are ``(H, W)`` int32, at most `FAR`.
 
     References
     ----------
@@ -246,27 +247,27 @@ def _step(to: Sums, cost: Sums, start: Sums, other: Sums, length: int) -> None:
 def filter_rows(rows: Plane, step: int) -> Plane:
     """Subtract from each byte of a PNG file's rows its Paeth predictor (section 9 of the standard).
 
-    That is the byte to the left, above, or above the left one (the corner), whichever is nearest to
-    ``left + above - corner``; of equals the first in this order. ``rows`` are ``(H, B)`` uint8,
-    ``step`` the bytes from a pixel to the next. Returned are ``(H, 1 + B)`` uint8, each row after
-    its filter's number, 4. The differences are taken modulo 256; beyond the image all is 0.
+    The predictor is the byte to the left, above, or above the left one (the corner), whichever is
+    nearest to ``left + above - corner``; the first in this order wins a tie. ``rows`` are
+    ``(H, B)`` uint8, ``step`` is the number of bytes from a pixel to the next. Returned are
+    ``(H, 1 + B)`` uint8, each row after its filter's number, 4. The differences are taken modulo
+    256; bytes outside the image are 0.
     """
     height, size = rows.shape
-    seen = np.zeros((1 + height, step + size), np.int16)
-    seen[1:, step:] = rows
-    left, above, corner = seen[1:, :size], seen[:-1, step:], seen[:-1, :size]
-    each = np.stack([left, above, corner])
-    nearest = np.abs(left + above - corner - each).argmin(axis=0)
-    taken = np.take_along_axis(each, nearest[None], axis=0)[0].astype(np.uint8)
-    return np.insert(rows - taken, 0, np.uint8(4), axis=1)
+    padded = np.zeros((1 + height, step + size), np.int16)
+    padded[1:, step:] = rows
+    left, above, corner = padded[1:, :size], padded[:-1, step:], padded[:-1, :size]
+    choices = np.stack([left, above, corner])
+    nearest = np.abs(left + above - corner - choices).argmin(axis=0)
+    predicted = np.take_along_axis(choices, nearest[None], axis=0)[0].astype(np.uint8)
+    return np.insert(rows - predicted, 0, np.uint8(4), axis=1)
 
 
 def label_rows(labels: Plane, bits: int) -> Plane:
     """Pack labels, the leftmost into a byte's highest bits, without a filter.
 
-    ``labels`` are ``(H, W)`` uint8, of each of which the lowest ``bits`` are taken, one of
-    `LABEL_BITS`. Returned are ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's
-    number, 0.
+    ``labels`` are ``(H, W)`` uint8; the lowest ``bits`` of each are packed, one of `LABEL_BITS`.
+    Returned are ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's number, 0.
     """
     single = np.unpackbits(labels[..., None], axis=2)[..., 8 - bits :]
     packed = np.packbits(single.reshape(len(labels), -1), axis=1)
@@ -279,19 +280,19 @@ def label_rows(labels: Plane, bits: int) -> Plane:
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     """Label the connected components of a mask (Eq. 9).
 
-    ``bits`` and ``width`` are the mask, see `roadeval.data.arrays`; ``connectivity`` is 8, or 4
-    where pixels that touch by a corner are not connected. Returned are the runs, ``(n, 4)`` int32:
-    row, first column, column after the last, and label of each of their rows' stretches, row after
-    row and from left to right; and how many components there are. Labels count from 1, in the order
-    of the components' first pixels.
+    ``bits`` and ``width`` are the mask, see `roadeval.data.arrays`; ``connectivity`` is 8, or 4 if
+    pixels that touch by a corner are not connected. Returned are the components' runs, their
+    stretches of rows, ``(n, 4)`` int32: row, first column, column after the last, and label, row
+    after row and from left to right; and the number of components. Labels count from 1, in the
+    order of the components' first pixels.
     """
-    count, found = cv2.connectedComponents(unpack(bits, width), connectivity=connectivity)
+    count, labels = cv2.connectedComponents(unpack(bits, width), connectivity=connectivity)
     # The library numbers them by blocks of rows.
-    seen, first = np.unique(found, return_index=True)
-    order = seen[seen > 0][np.argsort(first[seen > 0])]
+    used, first = np.unique(labels, return_index=True)
+    order = used[used > 0][np.argsort(first[used > 0])]
     number = np.zeros(count, np.int32)
     number[order] = np.arange(1, count)
-    return label_runs(number[found]), count - 1
+    return label_runs(number[labels]), count - 1
 
 
 def paint(runs: Runs, height: int, width: int) -> Labels:
@@ -303,7 +304,7 @@ def paint(runs: Runs, height: int, width: int) -> Labels:
 
 
 def label_runs(labels: Labels) -> Runs:
-    """Return the rows' stretches of equal labels of an ``(H, W)`` int32 image, see `components`."""
+    """Return the runs of equal labels of an ``(H, W)`` int32 image, see `components`."""
     begins = np.ones((labels.shape[0], labels.shape[1] + 1), np.bool_)
     begins[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
     y, x = np.nonzero(begins)
@@ -313,7 +314,7 @@ def label_runs(labels: Labels) -> Runs:
 
 
 def _run_pixels(runs: Runs) -> tuple[Sums, Sums, Sums]:
-    """Row, column and label of every pixel of some runs, ``(n,)`` each."""
+    """Return row, column and label of every pixel of some runs, ``(n,)`` each."""
     y, start, end, label = runs.T.astype(np.int64)
     length = end - start
     first = np.repeat(start - np.cumsum(length) + length, length)
@@ -321,7 +322,7 @@ def _run_pixels(runs: Runs) -> tuple[Sums, Sums, Sums]:
 
 
 def keep_region(bits: Bits, width: int) -> Bits:
-    """Keep the largest 8-connected component of a mask; of equals the first from the top.
+    """Keep the largest 8-connected component of a mask; the first from the top wins a tie.
 
     An empty mask stays empty.
     """
@@ -332,10 +333,7 @@ def keep_region(bits: Bits, width: int) -> Bits:
 
 
 def fill_holes(bits: Bits, width: int) -> Bits:
-    """Fill what a mask encloses.
-
-    A hole is a 4-connected set of zeros that does not reach the outside of the image.
-    """
+    """Fill the holes of a mask: 4-connected sets of zeros that do not reach the image's border."""
     outside = np.pad(unpack(bits, width), 1)
     cv2.floodFill(outside, None, (0, 0), 2, flags=4)
     return pack(outside[1:-1, 1:-1] != 2)
@@ -345,17 +343,16 @@ def fill_holes(bits: Bits, width: int) -> Bits:
 
 
 def tree_sum(
-    features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
+    features: Values, feature: Indices, threshold: Values, leaves: Masks, values: Values
 ) -> Values:
-    """Compute the sum of what decision trees give for each pixel.
+    """Compute the sum of decision trees for each pixel, ``(n,)`` float32, in the trees' order.
 
-    A tree's leaves are numbered from the left. Each of its nodes whose feature is above the
-    threshold rules out the leaves on its left; the first that no node has ruled out is the pixel's
-    [1]_. ``features`` are ``(F, n)`` float32: of n pixels. ``feature``, ``threshold`` and ``kept``
-    are ``(T, N)`` each, int32, float32 and uint32, of N nodes of T trees: a feature's place, what
-    it is compared with, and a bit for each leaf that is left where it is above that; the highest
-    bit is always set. ``values`` are ``(T, LEAVES)`` float32: what each leaf adds. Returned are
-    ``(n,)`` float32, summed in the trees' order.
+    A tree's leaves are numbered from the left. A node with a feature above the threshold rules out
+    the leaves on its left; the first leaf that no node has ruled out is the pixel's [1]_.
+    ``features`` are ``(F, n)`` float32, for n pixels. ``feature``, ``threshold`` and ``leaves`` are
+    ``(T, N)`` int32, float32 and uint32, for N nodes of T trees: a feature's place, the number that
+    it is compared with, and a bit for each leaf that remains if it is above that; the highest bit
+    is always set. ``values`` are ``(T, LEAVES)`` float32: the number that each leaf adds.
 
     References
     ----------
@@ -363,9 +360,9 @@ def tree_sum(
        Ensembles of Regression Trees, SIGIR 2015.
     """
     total: Values = np.zeros(features.shape[1], np.float32)
-    for which, least, left, given in zip(feature, threshold, kept, values, strict=True):
-        above = features[which] > least[:, None]
-        leaves = np.bitwise_and.reduce(np.where(above, left[:, None], ~np.uint32(0)), axis=0)
-        first = np.bitwise_count((leaves & -leaves) - np.uint32(1))
-        total += given[first]
+    for places, limits, masks, added in zip(feature, threshold, leaves, values, strict=True):
+        above = features[places] > limits[:, None]
+        left = np.bitwise_and.reduce(np.where(above, masks[:, None], ~np.uint32(0)), axis=0)
+        first = np.bitwise_count((left & -left) - np.uint32(1))
+        total += added[first]
     return total

@@ -1,7 +1,7 @@
-"""Camera logs (MCAP) in and out. No other room knows MCAP.
+"""Camera logs (MCAP), read and written. No other room knows MCAP.
 
 A log goes from bytes to frames through its sub-rooms: ``container`` (records, chunks, damage),
-``messages`` (pictures, whatever their encoding), ``topics`` (what there is, and which to replay)
-and ``truth`` (labels wherever they lie: what they mean, which image each belongs to); `Log.frames`
-puts them together. ``writing`` writes logs.
+``messages`` (pictures in every encoding), ``topics`` (the content of a log, and the choice of
+topics to replay) and ``truth`` (labels, their meaning and their images). `Log.frames` puts them
+together. ``writing`` writes logs.
 """

@@ -6,7 +6,7 @@ from roadeval.errors import RoadevalError
 
 
 class LogError(RoadevalError):
-    """A log that cannot be used as asked: what, which file or topic, and what to do next."""
+    """A problem of a log: what is wrong, in which file or topic, and what to do next."""
 
 
 class FrameError(RoadevalError):
@@ -14,11 +14,11 @@ class FrameError(RoadevalError):
 
 
 class LostMessageError(FrameError):
-    """A message in a chunk that cannot be read, which is a damage of the log by itself."""
+    """A message in an unreadable chunk, which is reported as damage of the log."""
 
 
 class BadRecord(Exception):  # noqa: N818  (never leaves this room)
-    """A record whose parts contradict each other, or that is not there."""
+    """A record that is missing, or whose parts contradict each other."""
 
 
 class BadMessage(Exception):  # noqa: N818  (never leaves this room)

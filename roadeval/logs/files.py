@@ -1,4 +1,4 @@
-"""The files of a log, what a file is that is no log, and folders of image files."""
+"""The files of a log, the kinds of files that are no log, and folders of image files."""
 
 from __future__ import annotations
 
@@ -19,16 +19,12 @@ from roadeval.runtime.text import visible
 
 _HEAD: Final = 64
 """Bytes by which a file is recognised."""
-_DAMAGED: Final = 2
-"""Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
 _RECORD: Final = re.compile(rb"[\x01\x06].{4}\0{4}", re.DOTALL)
-"""The head of a log's first record or of a chunk: an MCAP file whose first bytes are missing."""
+"""The head of a log's first record or of a chunk, in an MCAP file that lacks its first bytes."""
 
 METADATA: Final = "metadata.yaml"
 """The file in which rosbag2 describes the files beside it."""
-_NOTE: Final = 16 << 20
-"""Bytes of it that are read: those of a hundred thousand files."""
-# rosbag2 writes this one way. A parser of YAML would know them all, and ends the process on some.
+# rosbag2 writes the list in one form. A parser of YAML would crash the process on some files.
 _LIST: Final = re.compile(r"^ *relative_file_paths:[ \r]*\n((?: *- .*\n?)+)", re.MULTILINE)
 _ITEM: Final = re.compile(r"^ *-(.*)$", re.MULTILINE)
 
@@ -39,7 +35,7 @@ _NUMBERED: Final = (
         "{number}_{name}_*.mcap",
     ),
 )
-"""Names that rosbag2 gives the files of a log, of late with the time at which each begins."""
+"""Names that rosbag2 gives the files of a log; newer versions add the time of their beginning."""
 
 _OTHERS: Final = (
     (0, b"#ROSBAG V", "a ROS 1 bag: mcap convert {path} {stem}.mcap"),
@@ -53,7 +49,7 @@ _OTHERS: Final = (
     (0, b"\x89PNG\r\n", "a PNG image: roadeval pack makes a log of a folder of images"),
     (4, b"ftyp", "a video: roadeval pack {path} -o {stem}.mcap"),
 )
-"""How many bytes to skip, the bytes that follow, what the file is and how it becomes a log."""
+"""How many bytes to skip, the bytes that follow, the kind of file and how it becomes a log."""
 
 IMAGES: Final = frozenset(
     {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm"}
@@ -63,26 +59,25 @@ _SUFFIX: Final = re.compile(
     r"_(leftImg8bit|gt(Fine|Coarse)_\w+|(drivable|train)_id)$"
     r"|[_.-]?(labelids|labels?|masks?|gt|truth|road|seg|segmentation|annotations?|L)$"
 )
-"""What data sets put after the name that an image and its label share: Cityscapes, BDD100K, ..."""
+"""Endings that data sets add to the name that an image and its label share."""
 _KITTI: Final = re.compile(r"^(uu|umm?)_(road|lane)_(?=\d)")
 _HASH: Final = r"(?P<hash>[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}|[0-9a-f]{8,64})"
 _HASHED: Final = (
     re.compile(rf"{_HASH}[-_.](?P<name>.+)"),
     re.compile(rf"(?P<name>.+?)(?:_[a-z]+[-_.]rf)?[-_.]{_HASH}"),
 )
-"""Hashes that Label Studio puts before names, and Roboflow behind them."""
+"""Names with a hash: Label Studio puts it before the name, Roboflow behind it."""
 NUMBER: Final = "{number}"
-"""The place of the frame's number in a pattern of names."""
+"""Stands for the frame's number in a pattern of names."""
 _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
 
 
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
-    """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
+    """List the MCAP files of a log: the file itself, or those of a rosbag2 folder in natural order.
 
-    A file in a folder that is no MCAP file is left out, and returned as damage, and so is one that
-    is not there though the folder's `METADATA` lists it, or though those before and after it are: a
-    recorder numbers its files from 0. A `LogError` if there is none; the message names what there
-    is instead, and how to convert it.
+    Files of a folder that are no MCAP files, or are missing, are returned as damage. A file is
+    missing if the folder's `METADATA` lists it, or if its number, from 0, lacks among the others. A
+    `LogError` if there is no MCAP file; it names the files there, and how to convert them.
     """
     if not path.is_dir():
         _check(path)
@@ -96,14 +91,15 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     damage = [Damage(file, 0, problem) for file, problem in problems.items()]
     files = [file for file in there if file not in problems]
     if not files:
-        raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
-    lacking = sorted({*_missing(there), *_listed(path, {*there})} - {*there}, key=natural)
+        raise LogError(f"{path}: {damage[0]}" if damage else _describe_folder(path))
+    expected = {*_missing_numbers(there), *_files_in_metadata(path, {*there})}
+    lacking = sorted(expected - {*there}, key=natural)
     unnamed = "the file is not called *.mcap"
     return files, [*damage, *(Damage(file, 0, _problem(file) or unnamed) for file in lacking)]
 
 
-def _missing(files: Sequence[Path]) -> Iterator[Path]:
-    """Yield the files that lack among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
+def _missing_numbers(files: Sequence[Path]) -> Iterator[Path]:
+    """Yield the files that are missing among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
     for pattern, name_of in _NUMBERED:
         matches = [match for file in files if (match := pattern.fullmatch(file.name))]
         numbers = {int(match["number"]) for match in matches}
@@ -114,15 +110,14 @@ def _missing(files: Sequence[Path]) -> Iterator[Path]:
                 yield files[0].with_name(name_of.format(name=matches[0]["name"], number=number))
 
 
-def _listed(folder: Path, there: Set[Path]) -> set[Path]:
-    """Return the files that a recorder noted as the log's, by what it called them.
+def _files_in_metadata(folder: Path, there: Set[Path]) -> set[Path]:
+    """Return the files of the log that the recorder's `METADATA` lists.
 
-    There are none without such a note, and none if it lists no file that is ``there``: then it is
-    about others.
+    A list without any file that is ``there`` describes another log, and is left out.
     """
     block = None
     with suppress(OSError), (folder / METADATA).open("rb") as file:
-        block = _LIST.search(file.read(_NOTE).decode(errors="replace"))
+        block = _LIST.search(file.read(16 << 20).decode(errors="replace"))  # 100,000 files
     names = [] if block is None else _ITEM.findall(block[1])
     # Earlier recorders wrote the folder before the name.
     files = {folder / Path(name.strip(" \r'\"")).name for name in names}
@@ -130,7 +125,7 @@ def _listed(folder: Path, there: Set[Path]) -> set[Path]:
 
 
 def _problem(file: Path) -> str:
-    """Return why a file of a folder cannot be read as a part of a log; empty if it can."""
+    """Return why a file cannot be a part of a log; empty if it can."""
     if not file.exists():
         return "the file is missing"
     try:
@@ -141,7 +136,7 @@ def _problem(file: Path) -> str:
 
 
 def natural(path: Path) -> list[tuple[int, str]]:
-    """Sort key by which ``drive_2`` comes before ``drive_10``."""
+    """Return a sort key by which ``drive_2`` comes before ``drive_10``."""
     parts = re.findall(r"(\d+)|(\D+)", path.name)
     return [(int(number or 0), text) for number, text in parts]
 
@@ -156,7 +151,7 @@ def _check(path: Path) -> None:
 
 
 def check_content(path: Path, file: IO[bytes]) -> None:
-    """Raise a `LogError` for an open file that is no MCAP file, which says what it is instead."""
+    """Raise a `LogError` if an open file is no MCAP file; it says what the file is instead."""
     size = file.seek(0, 2)
     file.seek(0)
     head = file.read(_HEAD)
@@ -165,15 +160,16 @@ def check_content(path: Path, file: IO[bytes]) -> None:
     if not head:
         raise LogError(f"{path}: the file is empty")
     wrong = sum(ours != theirs for ours, theirs in zip(MAGIC, head, strict=False))
-    if head.startswith(MAGIC) or (wrong <= _DAMAGED and len(head) >= len(MAGIC)) or tail == MAGIC:
+    if head.startswith(MAGIC) or (wrong <= 2 and len(head) >= len(MAGIC)) or tail == MAGIC:
         return
-    other = _other(path, head)
+    other = _other_kind(path, head)
     if other or not _RECORD.search(head):
         other = other or f"something else (it begins with {head[:8].hex(' ')})"
         raise LogError(f"{path}: not an MCAP file but {other}")
 
 
-def _other(path: Path, head: bytes) -> str:
+def _other_kind(path: Path, head: bytes) -> str:
+    """Return the kind of a file by its first bytes; empty if it is unknown."""
     for skipped, magic, name in _OTHERS:
         if head[skipped:].startswith(magic):
             stem = path.name.split(".")[0]
@@ -182,25 +178,24 @@ def _other(path: Path, head: bytes) -> str:
     return "" if any(head) else "zeros: the disk or the copy failed"
 
 
-def _empty_folder(path: Path) -> str:
-    """Return what is wrong with a folder without MCAP files, and what lies in it instead."""
+def _describe_folder(path: Path) -> str:
+    """Return a message on a folder without MCAP files, with the first file of a known kind."""
     for file in sorted(filter(Path.is_file, path.iterdir()), key=natural):
         with suppress(OSError), file.open("rb") as opened:
-            if (head := opened.read(_HEAD)) and (other := _other(file, head)):
+            if (head := opened.read(_HEAD)) and (other := _other_kind(file, head)):
                 return f"{path}: no *.mcap file in it; {visible(file.name)} is {other}"
     return f"{path}: a folder without *.mcap files"
 
 
 def is_shown(file: Path) -> bool:
-    """Return whether a file is not hidden, as the ``._0000.png`` that macOS puts beside others."""
+    """Return whether a file is not hidden, unlike the ``._0000.png`` that macOS adds."""
     return not file.name.startswith(".")
 
 
-def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
+def list_files(folder: Path, endings: Collection[str], *, below: bool = False) -> list[Path]:
     """Return the files of a folder that have one of these endings, in natural order.
 
-    With ``below`` also those of the folders in it. A `LogError` if there is no such folder, or no
-    such file in it.
+    ``below`` includes the folders in it. A `LogError` if there is no such folder, or no such file.
     """
     try:
         inside = folder.rglob("*") if below and folder.is_dir() else folder.iterdir()
@@ -213,10 +208,10 @@ def listed(folder: Path, endings: Collection[str], *, below: bool = False) -> li
     return sorted(files, key=natural)
 
 
-def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
-    """Return files in the order of the times that their names are, with these in nanoseconds.
+def order_by_time(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
+    """Return files in the order of the times in their names, with these times in nanoseconds.
 
-    As they are, and None, if not every name is a time of its own.
+    If not every name is a time, or two are the same, return them unchanged, with None.
     """
     times = {file: time for file in files if (time := time_in(file.stem)) is not None}
     if len(times) < len(files) or len(set(times.values())) < len(files):
@@ -225,24 +220,21 @@ def ordered(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
     return in_order, [times[file] for file in in_order]
 
 
-def some(files: Sequence[str | Path]) -> str:
+def first_names(files: Sequence[str | Path]) -> str:
     """Return the names of the first three files, for messages."""
     names = ", ".join(visible(Path(file).name) for file in files[:3])
     return names + (", ..." if len(files) > 3 else "")
 
 
-def of_ids(labels: Sequence[Path]) -> Sequence[Path]:
-    """Return the label images of classes' ids where Cityscapes has others beside them; else all."""
+def prefer_ids(labels: Sequence[Path]) -> Sequence[Path]:
+    """Return Cityscapes' label images with ids of classes if there are any, else all labels."""
     return [label for label in labels if label.stem.endswith("_labelIds")] or labels
 
 
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
-    """Find for each label the image of its name.
-
-    The name is taken as it is, or as `bare`, or without what all labels have before and after it.
-    """
-    exact, loose = {file.stem: file for file in images}, {bare(file): file for file in images}
-    names = without_hashes([*map(bare, labels)])
+    """Find the image of each label by its name, unchanged, `bare_name`, or without shared ends."""
+    exact, loose = {file.stem: file for file in images}, {bare_name(file): file for file in images}
+    names = without_hashes([*map(bare_name, labels)])
     ends = [len(part) for part in _shared([name[::-1] for name in names])]
     matches = (
         [loose.get(name.removeprefix(begin)[: -end or None]) for name in names]
@@ -251,21 +243,21 @@ def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, P
     )
     best = max(matches, key=lambda belong: len(belong) - belong.count(None), default=[])
     pairs = {
-        label: exact.get(label.stem) or exact.get(bare(label)) or image
+        label: exact.get(label.stem) or exact.get(bare_name(label)) or image
         for label, image in zip(labels, best, strict=True)
     }
     return {label: image for label, image in pairs.items() if image is not None}
 
 
 def _shared(names: Sequence[str]) -> list[str]:
-    """Return what all names begin with, up to each of its separators, the shortest first."""
+    """Return the begin that all names share, up to each of its separators, the shortest first."""
     pairs = zip(min(names, default=""), max(names, default=""), strict=False)
     common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     return ["", *(common[: mark.end()] for mark in re.finditer(r"[^0-9A-Za-z]+", common))]
 
 
 def without_hashes(names: Sequence[str]) -> Sequence[str]:
-    """Return names without the hash that a tool put before or behind each of them, if it did.
+    """Return names without the hash that a tool put before or behind all of them.
 
     >>> without_hashes(["0a1b2c3d-frame_7", "11223344-frame_8"])
     ['frame_7', 'frame_8']
@@ -279,25 +271,25 @@ def without_hashes(names: Sequence[str]) -> Sequence[str]:
     return names
 
 
-def matching(pattern: str, name: str) -> re.Match[str] | None:
-    """Match a whole name with a pattern: ``*`` any text, ``?`` any letter, `NUMBER` digits."""
+def match_name(pattern: str, name: str) -> re.Match[str] | None:
+    """Match a name with a pattern: ``*`` is any text, ``?`` any letter, `NUMBER` digits."""
     kinds = {"*": ".*", "?": ".", NUMBER: r"(?<!\d)(\d+)"}
     parts = re.split(rf"([*?]|{re.escape(NUMBER)})", pattern)
     regex = "".join(kinds.get(part, re.escape(part)) for part in parts)
     return re.fullmatch(regex, name, re.DOTALL)
 
 
-def bare(file: Path) -> str:
-    """Return a file's name without its ending, and without what marks an image or a label.
+def bare_name(file: Path) -> str:
+    """Return a file's name without its ending, and without marks of an image or a label.
 
-    >>> bare(Path("um_road_000012.png")), bare(Path("a_000019_gtFine_labelIds.png"))
+    >>> bare_name(Path("um_road_000012.png")), bare_name(Path("a_000019_gtFine_labelIds.png"))
     ('um_000012', 'a_000019')
     """
     return _SUFFIX.sub("", _KITTI.sub(r"\1_", file.stem))
 
 
 def time_in(name: str) -> int | None:
-    """Return nanoseconds since 1970, if the whole name is a time."""
+    """Return nanoseconds since 1970 if a name is a time."""
     match = _TIME.fullmatch(name)
     if match is None:
         return None

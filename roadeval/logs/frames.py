@@ -1,4 +1,4 @@
-"""What a replay selects of a log, and its frames: read in bounded memory, decoded in any thread."""
+"""The selection of a replay, and its frames: read in bounded memory, decoded in any thread."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import ROAD, Calibration, Frame, Rgb
+from roadeval.data import ROAD, Calibration, Frame
 from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
 from roadeval.images.decoding import orientation_of
@@ -31,10 +31,10 @@ from roadeval.logs.truth.labels import (
     LabelSource,
     check_size,
     meaning_of,
-    nothing_of,
     read_or_error,
     samples,
     size_problem,
+    undecodable,
 )
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -62,23 +62,23 @@ class Selection:
     camera: Camera
     """The camera's images, and how labels are paired with them."""
     image_why: str
-    """Why that camera."""
+    """Why that camera was chosen."""
     labels: Mapping[str, LabelSource]
     """`TRUTH`, `SHADOW`, and other systems' road masks by name, those in the log first."""
     scale: float = 1.0
     """Scale of the frames that are read, relative to the camera's; at most 1."""
     no_truth: str = ""
-    """Why there is no road truth; empty if there is."""
+    """Why there is no road truth."""
     calibration: Calibration | None = None
-    """The camera's, of the size in which it was logged."""
+    """The camera's calibration, for images of the logged size."""
     calibration_why: str = ""
-    """Remarks on the calibration; or the reason why the log's is not used."""
+    """Remarks on the calibration, or why the log's calibration is not used."""
     ground: Ground | None = None
-    """The ground before the camera, for images of the size in which it was logged."""
+    """The ground before the camera, for images of the logged size."""
     ground_why: str = ""
-    """How it is known, or what is missing of a camera of which something is known."""
+    """The source of the ground, or what is missing for it."""
     white: float | None = None
-    """The sample that is white in the camera's images; None of images of 8 bits."""
+    """The sample that is white in the camera's images; None for images of 8 bits."""
 
     @property
     def image(self) -> TopicInfo:
@@ -101,7 +101,7 @@ class Selection:
         return {name: s for name, s in self.labels.items() if name not in (TRUTH, SHADOW)}
 
     def digests(self) -> dict[str, str]:
-        """Return the SHA-256 of labels that are not in the log: of ``truth``, and masks by name."""
+        """Return the SHA-256 of the labels beside the log: of ``truth``, and of masks by name."""
         return {
             name.removeprefix("/"): source.digest()
             for name, source in self.labels.items()
@@ -115,12 +115,12 @@ class Selection:
 
     @property
     def ground_as_read(self) -> Ground | None:
-        """The ground, for images of the size in which they are read."""
+        """The ground, for frames of the size in which they are read."""
         return self.ground.scaled(*self.size) if self.ground and self.size else None
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return warnings about the camera's images, a sentence each."""
+        """Warnings about the camera's images, a sentence each."""
         notes = []
         if self.white not in (None, 1, WHITE):
             notes.append(f"a sample of {self.white:g} is white; `frames.white` sets another")
@@ -133,7 +133,7 @@ class Selection:
         return tuple(notes)
 
     def among_truth(self, numbers: Sequence[int]) -> Sequence[int]:
-        """Return those of some frames that lie where truth does, as far as no label is read."""
+        """Return the frames that lie in the range of the truth, by keys and times of the labels."""
         if self.truth is None:
             return numbers
         labels, times = self.truth.pictures, self.camera.images.log_times
@@ -145,7 +145,7 @@ class Selection:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Which topics were chosen and why, a sentence each."""
+        """The topics that were chosen and why, a sentence each."""
         lines = [f"image: {self.image.name} ({'; '.join((self.image_why, *self.notes))})"]
         for name, source in self.labels.items():
             what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
@@ -154,12 +154,12 @@ class Selection:
                 words = words.replace("road is", "shadow is")
             lines.append(f"{what}: {source.where} ({source.why}; {words})")
             lines += [f"{what}: {note}" for note in (*source.notes, *source.meaning.notes)]
-        if known := self.calibration:
-            place = f", mounted in {known.mounting.parent}" if known.mounting else ""
-            model = known.model or f"{'a nameless' if known.bends else 'no'} distortion"
-            lines.append(f"calibration: {known.topic} ({model}{place})")
+        if lens := self.calibration:
+            place = f", mounted in {lens.mounting.parent}" if lens.mounting else ""
+            model = lens.model or f"{'a nameless' if lens.bends else 'no'} distortion"
+            lines.append(f"calibration: {lens.topic} ({model}{place})")
         if self.calibration_why:
-            lines.append(f"{'' if known else 'no '}calibration: {self.calibration_why}")
+            lines.append(f"{'' if lens else 'no '}calibration: {self.calibration_why}")
         if self.ground_why:
             lines.append(self.ground_why)
         if self.no_truth:
@@ -182,43 +182,40 @@ def settle(
     *,
     of_rig: bool = False,
 ) -> Selection:
-    """Settle what to replay of a log's own topics; ``of_rig`` is that of `choose_truth`.
-
-    A `LogError` as `roadeval.logs.log.Log.select` says.
-    """
-    asked = config.topics
-    topics = [_of_camera(topic, readers[topic.name], asked.frame_id) for topic in topics]
-    image, why = choose_image(topics, asked.image)
+    """Choose from a log's topics; see `choose_truth` for ``of_rig``, `Log.select` for errors."""
+    settings = config.topics
+    topics = [_with_frame_id(topic, readers[topic.name], settings.frame_id) for topic in topics]
+    image, why = choose_image(topics, settings.image)
     if image.problem or "depth" in image.format.lower():
         _check_readable(readers[image.name], image)
     if config.truth.path:
         truth = Choice(None, "")
     else:
-        truth = choose_truth(topics, image, asked.truth, config.labels, of_rig=of_rig)
-    choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow)}
-    # What would be scored against itself is refused.
+        truth = choose_truth(topics, image, settings.truth, config.labels, of_rig=of_rig)
+    choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, settings.shadow)}
     if truth.topic == image:
         raise LogError(f"`topics.truth` {image.name}: it is the image's own topic")
-    for name, topic in asked.masks.items():
+    for name, topic in settings.masks.items():
         choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         if choices[name].topic == truth.topic:
             raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
     images = readers[image.name]
-    most_ns = tolerance(images, asked.sync_tolerance_ms)
-    camera = Camera(images, image, clock_of(images), most_ns, asked.resize_truth)
+    most_ns = tolerance(images, settings.sync_tolerance_ms)
+    camera = Camera(images, image, clock_of(images), most_ns, settings.resize_truth)
     labels = {}
-    for name, (chosen, reason) in choices.items():
-        if chosen is not None:
-            settings = MaskSettings(labels=config.labels if name == TRUTH else LabelSettings())
-            reader = readers[chosen.name]
-            pairing = by_time(reader, camera, asked.sync_offset_ms if name == TRUTH else 0.0)
-            check_size(chosen.size, reader, 0, camera, pairing)
-            meaning = meaning_of(reader, settings)
+    for name, (label_topic, reason) in choices.items():
+        if label_topic is not None:
+            is_truth, reader = name == TRUTH, readers[label_topic.name]
+            pairing = by_time(reader, camera, settings.sync_offset_ms if is_truth else 0.0)
+            check_size(label_topic.size, reader, 0, camera, pairing)
+            values = MaskSettings(labels=config.labels if is_truth else LabelSettings())
+            meaning = meaning_of(reader, values)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
-    known = calibration_of(image, topics, readers)
-    if any(known) and image.turned != 1 and camera.images.limits.turn:
-        known = None, "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
-    ground, ground_why = ground_of(known[0], config.ground, image.size)
+    calibration = calibration_of(image, topics, readers)
+    if any(calibration) and image.turned != 1 and camera.images.limits.turn:
+        reason = "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
+        calibration = None, reason
+    ground, ground_why = ground_of(calibration[0], config.ground, image.size)
     if any(config.ground.distortion) and is_rectified(image.name):
         ground_why += "; `ground.distortion` is applied although the topic's name says rectified"
     return Selection(
@@ -227,48 +224,47 @@ def settle(
         labels,
         config.frames.scale,
         "" if truth.topic else truth.why,
-        *known,
+        *calibration,
         ground,
         ground_why,
-        _white_of(images, config.frames.white),
+        _white_sample(images, config.frames.white),
     )
 
 
-def _of_camera(topic: TopicInfo, reader: TopicReader, frame_id: str | None) -> TopicInfo:
-    """Return a topic as that of the camera that is asked for, if some of its images are of it."""
+def _with_frame_id(topic: TopicInfo, reader: TopicReader, frame_id: str | None) -> TopicInfo:
+    """Return a topic with a ``frame_id``, if some of its images have that."""
     if frame_id is None or not topic.is_image or not len(reader):
         return topic
-    looked_at = {*np.linspace(0, len(reader) - 1, 2 * LOOKED_AT, dtype=int).tolist()}
-    is_of_it = frame_id in map(reader.frame_id, looked_at)
-    return replace(topic, frame_id=frame_id) if is_of_it else topic
+    positions = {*np.linspace(0, len(reader) - 1, 2 * LOOKED_AT, dtype=int).tolist()}
+    has_images = frame_id in map(reader.frame_id, positions)
+    return replace(topic, frame_id=frame_id) if has_images else topic
 
 
-BITS: Final = (8, 10, 12, 14, 16)
-"""Numbers of bits that samples of cameras have."""
-WHITE: Final = (1 << BITS[-1]) - 1
-BRIGHT: Final = 2.0
-"""Greatest sample, at most, of pictures of fractions, some of which go beyond 1."""
+WHITE: Final = (1 << 16) - 1
+"""The default of the white sample in images of more than 8 bits."""
 
 
-def _white_of(images: TopicReader, asked: float | None) -> float | None:
-    """Return the sample that is white in a camera's pictures; None where they have 8 bits.
+def _white_sample(images: TopicReader, setting: float | None) -> float | None:
+    """Return the sample that is white in a camera's pictures; None if they have 8 bits.
 
-    Unless it is asked for it follows from the greatest sample of some pictures of the whole topic.
+    By default it follows from the greatest sample of some pictures all over the topic.
     """
-    most, kind = 0.0, ""
+    greatest, kind = 0.0, ""
     for _, picture in samples(images):
         with suppress(BadMessage):
             deep = deep_samples(picture, images.limits)
-            if deep is None or asked is not None:
-                return None if deep is None else asked
-            most, kind = max(most, float(deep[np.isfinite(deep)].max(initial=0))), deep.dtype.kind
-    if not kind or (kind == "f" and most <= BRIGHT):
+            if deep is None or setting is not None:
+                return None if deep is None else setting
+            greatest = max(greatest, float(deep[np.isfinite(deep)].max(initial=0)))
+            kind = deep.dtype.kind
+    if not kind or (kind == "f" and greatest <= 2):  # fractions may go somewhat beyond 1
         return 1 if kind else None
-    return next(((1 << bits) - 1 for bits in BITS if most < 1 << bits), most)
+    bits_of_cameras = (8, 10, 12, 14, 16)
+    return next(((1 << bits) - 1 for bits in bits_of_cameras if greatest < 1 << bits), greatest)
 
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
-    """Refuse, as a `LogError`, a topic of whose sampled messages none can be decoded."""
+    """Raise a `LogError` if none of some messages of a topic can be decoded."""
     problem = topic.problem
     for _, picture in samples(reader):
         try:
@@ -277,29 +273,20 @@ def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
             problem = problem or str(error)
         else:
             return
-    raise nothing_of(reader, problem)
-
-
-Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
-
-
-NAMED: Final = 5
-"""Frames that a sentence names."""
-FEW: Final = 10
-"""Blank images are told if at least one in so many is blank."""
+    raise undecodable(reader, problem)
 
 
 @dataclass(slots=True)
 class Accounting:
     """Counts of frames and of truth, which grow while frames are read.
 
-    Any thread may add to ``undecodable`` and ``in_chunks``, which are by frame number.
+    Any thread may add to ``undecodable`` and ``in_chunks``, which have frame numbers as keys.
     """
 
     in_log: int = 0
     """Messages of the image topic."""
     in_range: int = 0
-    """Messages inside the range, before its stride and its limit."""
+    """Messages inside the range of times."""
     read: int = 0
     """Frames returned so far."""
     labelled: int = 0
@@ -315,33 +302,30 @@ class Accounting:
     undecodable: dict[int, str] = field(default_factory=dict)
     """Why frames could not be decoded, by their numbers."""
     odd_sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """Frames that have another width and height than the topic's first image."""
+    """Frames with another width and height than the topic's first image."""
     blank: dict[int, str] = field(default_factory=dict)
-    """Frames that are black or white all over."""
+    """Frames that are ``black`` or ``white``."""
     of_video: Mapping[str, str] = field(default_factory=dict)
-    """Sentences on a video, by what they are of."""
+    """Sentences on a video, by their subject."""
     in_chunks: set[int] = field(default_factory=set)
-    """Undecodable frames whose chunk cannot be read, which is a damage of the log by itself."""
+    """Undecodable frames in unreadable chunks, which are reported as damage of the log."""
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """Return a sentence on each undecodable frame that is not ``in_chunks``."""
+        """A sentence on each undecodable frame that is not ``in_chunks``."""
         lost = sorted(self.undecodable.keys() - self.in_chunks)
         return tuple(f"frame {number}: {self.undecodable[number]}" for number in lost)
 
     @property
     def notes(self) -> Iterator[str]:
-        """Sentences on images that repeat others, are blank, or have another size than the first.
-
-        Few that are blank are not told: they may be those in which an exposure settles.
-        """
+        """Sentences on images that repeat others, are blank, or differ in size from the first."""
         if self.repeated:
             yield (
                 f"{self.repeated} of the {self.read} images repeat an earlier one, by stamp and "
                 "content; each of them is counted"
             )
         yield from self.of_video.values()
-        # A few are alike where the vehicle stands, or where there is no road.
+        # A few labels are alike if the vehicle stands, or if there is no road.
         if self.labels_repeated > self.labelled / 5:
             yield (
                 f"{self.labels_repeated} of the {self.labelled} labels repeat an earlier one bit "
@@ -350,47 +334,48 @@ class Accounting:
         if len(self.frame_ids) > 1:
             names = [f"{visible(name)} ({count})" for name, count in self.frame_ids.items()]
             yield (
-                f"the images are of several cameras, by frame_id: {first_of(names, NAMED)}; "
+                f"the images are of several cameras, by frame_id: {first_of(names, 5)}; "
                 "`topics.frame_id` chooses one"
             )
         for level in ("black", "white"):
             blank = [number for number, colour in self.blank.items() if colour == level]
-            if blank and FEW * len(blank) >= self.read:
+            if blank and 10 * len(blank) >= self.read:  # an exposure may take a few to settle
                 yield (
-                    f"{len(blank)} of the {self.read} images are {level} (frames {_named(blank)}): "
+                    f"{len(blank)} of the {self.read} images are {level} (frames {_few(blank)}): "
                     "nothing can be seen in them, or learnt from them"
                 )
         if self.odd_sizes:
             sizes = sorted({f"{width}x{height}" for width, height in self.odd_sizes.values()})
             yield (
                 f"the images' sizes vary: {len(self.odd_sizes)} of the {self.read} are not of the "
-                f"first one's size but {' or '.join(sizes)} (frames {_named(self.odd_sizes)}); "
+                f"first one's size but {' or '.join(sizes)} (frames {_few(self.odd_sizes)}); "
                 "labels are held against their own images, and the recording shows all images in "
                 "the first one's size"
             )
 
 
-def _named(frames: Iterable[int]) -> str:
-    return first_of([*map(str, sorted(frames))], NAMED)
+def _few(frames: Iterable[int]) -> str:
+    """Return the first frame numbers, and how many more there are."""
+    return first_of([*map(str, sorted(frames))], 5)
 
 
 class Label(NamedTuple):
-    """A label of a frame as logged, not decoded yet."""
+    """A label of a frame, not decoded yet."""
 
     picture: Picture | FrameError
     """The picture, or why it cannot be read."""
     place: str
-    """Its topic, or its own file, for messages."""
+    """Its topic or its file, for messages."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoggedFrame:
-    """A frame as logged, not decoded yet."""
+    """A frame of the log, not decoded yet."""
 
     number: int
     """Position in the image topic by log time, from 0, undecodable messages included."""
     stamp_ns: int
-    """Header stamp; the log time where the log has no stamps."""
+    """Header stamp; the log time if the log has no stamps."""
     log_time_ns: int
     picture: Picture | FrameError
     """The image, or why it cannot be read."""
@@ -406,10 +391,7 @@ class LoggedFrame:
         return TRUTH in self.labels
 
     def decode(self) -> Frame:
-        """Decode image and labels; any thread may do so, and mostly releases the interpreter lock.
-
-        A `FrameError` if the image or a label of it cannot be decoded.
-        """
+        """Decode image and labels, in any thread; a `FrameError` if one cannot be decoded."""
         try:
             return self._decode()
         except (BadMessage, FrameError) as error:
@@ -429,14 +411,16 @@ class LoggedFrame:
         logged = image.shape[1], image.shape[0]
         if self.selection.image.size not in (None, logged):
             self.accounting.odd_sizes[self.number] = logged
-        if level := _blank(image):
-            self.accounting.blank[self.number] = level
+        sample = image[::4, ::4]
+        for level, is_level in (("black", sample <= 16), ("white", sample >= 240)):
+            if is_level.mean() >= 0.99:
+                self.accounting.blank[self.number] = level
         size = scaled_size(logged, scale)
         labels = {name: self._label(name, logged, size) for name in self.labels}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
         format_ = None
         if isinstance(picture, CompressedPicture) and scale == 1:
-            # Viewers of recordings turn none.
+            # Viewers of recordings do not turn images.
             format_ = format_of(picture.data) if orientation_of(picture.data) == 1 else None
         return Frame(
             self.number,
@@ -454,7 +438,7 @@ class LoggedFrame:
         )
 
     def _label(self, name: str, *sizes: tuple[int, int]) -> Labels:
-        """Decode a label, and bring it to the size of the image: as logged, then as read."""
+        """Decode a label, and resize it to the image as logged, then as read."""
         import cv2
 
         picture, place = self.labels[name]
@@ -465,8 +449,8 @@ class LoggedFrame:
             label = self.selection.labels[name].meaning.read(picture, camera.images.limits)
         except BadMessage as error:
             raise FrameError(f"{place}: {error}") from error
-        told = place, label.truth.shape[1::-1], "its image", sizes[0]
-        if problem := size_problem(*told, resize=camera.resize_labels):
+        theirs, resize = label.truth.shape[1::-1], camera.resize_labels
+        if problem := size_problem(place, theirs, "its image", sizes[0], resize=resize):
             raise FrameError(problem)
         truth, codes = label.truth, label.probability
         for size in sizes:
@@ -477,23 +461,19 @@ class LoggedFrame:
 
 
 class FrameStream:
-    """The frames of a selection, in the order of their log times.
-
-    ``accounting`` has the counts of the frames so far.
-    """
+    """The frames of a selection, by log time; ``accounting`` has the counts so far."""
 
     def __init__(
         self, selection: Selection, in_range: int, numbers: Sequence[int], *, labelled: bool
     ) -> None:
-        """Begin a stream of the frames of these numbers, from a range of so many.
+        """Begin a stream of the frames with these numbers, of ``in_range`` frames in the range.
 
-        Of those that have no truth not even the chunks are read if only ``labelled`` ones are
-        asked for.
+        With ``labelled`` the frames without truth are left out; not even their chunks are read.
         """
         images, truth = selection.camera.images, selection.truth
         self._selection = selection
         self.numbers: Final = numbers
-        """The numbers of the frames that are asked for, in order."""
+        """The numbers of the frames, in order."""
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
         self._pictures: PictureSequence = images
         if selection.image.kind is TopicKind.VIDEO:
@@ -507,10 +487,10 @@ class FrameStream:
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
         self._contents: dict[int, int] = {}
-        """The stamp of the first label of each content that was read, by its hash."""
+        """The stamp of the first label of each content, by the hash of the content."""
         read: Iterable[int] = numbers
         if labelled:
-            read = with_label(truth, images, numbers) if truth else ()
+            read = labelled_numbers(truth, images, numbers) if truth else ()
         self._iterator = map(self._frame, read)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
@@ -528,16 +508,16 @@ class FrameStream:
         return self._selection.camera.images.log_times[np.asarray(self.numbers, np.intp)]
 
     def unpaired(self) -> Iterator[str]:
-        """Yield a sentence on labels with stamps that no frame has, and on frames that lost theirs.
+        """Yield a sentence on labels without a frame, and on frames that lost their label.
 
-        Nothing is known of them where frames between others are not read.
+        If frames between others are not read, nothing is known of their labels.
         """
-        first, last, asked = self.numbers[0], self.numbers[-1], len(self.numbers)
+        first, last, frames = self.numbers[0], self.numbers[-1], len(self.numbers)
         for name, (source, partners) in self._labels.items():
-            if not isinstance(source.pairing.images, TopicReader) or asked <= last - first:
+            if not isinstance(source.pairing.images, TopicReader) or frames <= last - first:
                 continue
             shown = f"{name.removeprefix('/')}: "
-            count, away = partners.unpaired(of_all=asked == self.accounting.in_log)
+            count, away = partners.unpaired(of_all=frames == self.accounting.in_log)
             if count:
                 yield (
                     f"{shown}{count} of the {len(source.pictures)} labels of {source.where} belong "
@@ -558,7 +538,7 @@ class FrameStream:
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels
         self.accounting.masks.update(labels.keys() - {TRUTH, SHADOW})
-        # Reading a message corrects its log time where the file's index is wrong.
+        # Reading a message corrects its log time if the file's index is wrong.
         picture = read_or_error(self._pictures, number)
         if name := getattr(picture, "frame_id", ""):
             self.accounting.frame_ids[name] += 1
@@ -578,8 +558,8 @@ class FrameStream:
         )
 
 
-def looked_at(selection: Selection) -> Iterator[str]:
-    """Yield what some images of a camera show a user to know before a replay, a sentence each."""
+def look_at_images(selection: Selection) -> Iterator[str]:
+    """Look at some images of a camera; yield a sentence on each thing to know before a replay."""
     images = selection.camera.images
     places = [*range(min(LOOKED_AT, len(images)))]
     if images.is_small and selection.image.kind is not TopicKind.VIDEO:
@@ -592,57 +572,46 @@ def looked_at(selection: Selection) -> Iterator[str]:
 
 
 def are_few(images: TopicReader, numbers: Sequence[int]) -> bool:
-    """Return whether images between these lie in chunks that need not be read for these."""
+    """Return whether some images between these lie in chunks that these do not need."""
     between = range(numbers[0], numbers[-1] + 1)
     return images.chunks_of(numbers) < images.chunks_of(between)
 
 
-def with_label(source: LabelSource, images: TopicReader, numbers: Sequence[int]) -> Iterator[int]:
-    """Yield those of some frames, in order, that have a label, and read no more than that takes.
+def labelled_numbers(
+    source: LabelSource, images: TopicReader, numbers: Sequence[int]
+) -> Iterator[int]:
+    """Yield the frames that have a label, in order.
 
-    They are looked for image by image, or label by label where fewer chunks are read for that.
+    The search goes image by image, or label by label if it reads fewer chunks.
     """
     ends, few = [], are_few(images, numbers)
-    for number in (*numbers[-2:], numbers[0]):  # of the last two one may have a damaged stamp
+    for number in (*numbers[-2:], numbers[0]):  # one of the last two may have a damaged stamp
         partners = source.partners(int(images.log_times[number]), few=few)
         partners.of(number)
         ends.append(partners.near)
     *last, first = ends
     begin, end = max(first - REACH, 0), max(last) + REACH
-    # A label's chunk and its image's.
+    # Each label takes its own chunk and its image's.
     if source.pairing.is_small or images.chunks_of(numbers) <= 2 * (end - begin):
         yield from (number for number in numbers if partners.of(number) is not None)
         return
-    wanted = frozenset(numbers)
+    in_range = frozenset(numbers)
     by_label = frames_of(source.pairing, begin, end, few=True)
-    labelled = (number for number in by_label if number in wanted)
-    waiting = sorted(islice(labelled, 2 * REACH))  # labels may be logged nearly in order
+    labelled = (number for number in by_label if number in in_range)
+    waiting = sorted(islice(labelled, 2 * REACH))  # labels are logged nearly in order
     yield from (heappushpop(waiting, number) for number in labelled)
     yield from sorted(waiting)
 
 
-def in_step(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
-    """Yield the frames of several cameras of a log by log time, each with its camera's place.
-
-    So the log is read once for all of them.
-    """
+def merge_streams(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedFrame]]:
+    """Yield the frames of several streams by log time, each with the number of its stream."""
     times = np.concatenate([stream.log_times for stream in streams])
-    whose = np.repeat(np.arange(len(streams)), [*map(len, streams)])
-    for place in whose[np.argsort(times, kind="stable")].tolist():
-        yield place, next(streams[place])
+    numbers = np.repeat(np.arange(len(streams)), [*map(len, streams)])
+    for number in numbers[np.argsort(times, kind="stable")].tolist():
+        yield number, next(streams[number])
 
 
-DARK, LIGHT = 16, 240
-"""Levels at most, and at least, of an image that is black, or white."""
-ALL: Final = 0.99
-"""Share of its samples."""
-
-
-def _blank(image: Rgb) -> str:
-    """Return ``black`` or ``white`` for an image that is nothing else; else empty."""
-    some = image[::4, ::4]
-    shares = {"black": (some <= DARK).mean(), "white": (some >= LIGHT).mean()}
-    return next((level for level, share in shares.items() if share >= ALL), "")
+Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
 
 
 def _resized(pixels: Pixels, size: tuple[int, int], how: int) -> Pixels:

@@ -1,4 +1,4 @@
-"""A camera log: its topics, what to replay of it, and its frames."""
+"""A camera log: its topics, its damage, the choice of what to replay, and its frames."""
 
 from __future__ import annotations
 
@@ -19,15 +19,22 @@ from roadeval.logs.container.file import Container, Damage, containers_in, damag
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import check_content, files_of
-from roadeval.logs.frames import TRUTH, FrameStream, Selection, looked_at, settle, with_label
+from roadeval.logs.frames import (
+    TRUTH,
+    FrameStream,
+    Selection,
+    labelled_numbers,
+    look_at_images,
+    settle,
+)
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.labels import LabelSource, beside_log, log_and_topic
-from roadeval.logs.truth.names import shown_name, with_keys
+from roadeval.logs.truth.labels import LabelSource, log_and_topic, source_beside_log
+from roadeval.logs.truth.names import find_keys, shown_name
 from roadeval.runtime.text import visible
 
 
@@ -36,7 +43,7 @@ class RemoteLog:
     """A log that lies elsewhere: one file."""
 
     source: str
-    """Where it lies, as it may be shown."""
+    """Its URL, without secrets."""
     path: Path
     """Its name."""
     file: IO[bytes]
@@ -55,9 +62,14 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
     else:
         opened, source, path = None, str(path), Path(path)
         files, damage = files_of(path)
-    states = {} if opened else _states(files)
-    asked = config.frames
-    limits = Limits(asked.max_pixels, turn=not asked.unturned, full_range=asked.full_range)
+    states: dict[Path, tuple[int, ...]] = {}
+    for file in files if opened is None else ():
+        with suppress(OSError), file.open("rb") as content:
+            content.seek(-len(MAGIC), os.SEEK_END)
+            if content.read() == MAGIC:  # no recorder still writes the file
+                states[file] = _state(os.fstat(content.fileno()))
+    frames = config.frames
+    limits = Limits(frames.max_pixels, turn=not frames.unturned, full_range=frames.full_range)
     try:
         containers = [
             container
@@ -77,17 +89,6 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
     return Log(path, source, visible(name), config, topics, readers, containers, damage, states)
 
 
-def _states(files: Sequence[Path]) -> dict[Path, tuple[int, ...]]:
-    """Return `Log.states` of those files that no recorder still writes."""
-    states: dict[Path, tuple[int, ...]] = {}
-    for file in files:
-        with suppress(OSError), file.open("rb") as content:
-            content.seek(-len(MAGIC), os.SEEK_END)
-            if content.read() == MAGIC:
-                states[file] = _state(os.fstat(content.fileno()))
-    return states
-
-
 def _state(facts: os.stat_result) -> tuple[int, ...]:
     return facts.st_ino, facts.st_size, facts.st_mtime_ns
 
@@ -98,11 +99,11 @@ class Log:
 
     path: Path
     source: str
-    """Where it lies, as a URL if it lies elsewhere; fit to be shown."""
+    """Its path, or its URL without secrets."""
     name: str
-    """Its name without folder and suffix, fit to be shown."""
+    """Its name without folder and suffix; control characters are escaped."""
     config: LogConfig
-    """All that is asked of it."""
+    """The settings by which it is read."""
     topics: tuple[TopicInfo, ...]
     """Every topic, by name."""
     readers: Mapping[str, TopicReader]
@@ -112,12 +113,11 @@ class Log:
     lost_files: Sequence[Damage]
     """Files that cannot be read at all."""
     states: Mapping[Path, tuple[int, ...]]
-    """Inode, bytes and time of change (ns) of each file when it was opened: a file that is written
-    anew has others. A file that a recorder still writes is not among them."""
+    """Inode, bytes and time of change (ns) of each complete file when it was opened."""
     of_rig: bool = False
-    """Whether other cameras of it are replayed, too."""
+    """Whether other cameras of the log are replayed, too."""
     beside: list[Log] = field(default_factory=list)
-    """Other logs that hold labels; they stay open as long as this one."""
+    """Other logs that hold labels; they are closed with this one."""
 
     @cached_property
     def start_ns(self) -> int:
@@ -133,17 +133,17 @@ class Log:
 
     @property
     def damage(self) -> tuple[Damage, ...]:
-        """Return what could not be read, in the order of the files."""
+        """Damage that is known so far, in the order of the files."""
         damages = [*self.lost_files, *chain(*map(damage_of, self.containers))]
         return tuple(replace(damage, log_start_ns=self.start_ns) for damage in damages)
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """The losses of the log, a sentence each; empty if nothing is lost.
+        """The losses of the log, a sentence each.
 
         Damage inside chunks is found when they are read, or by `verify`. The checksum of all data
-        is looked at where chunks have none of their own, and in a log of at most `SMALL` bytes. A
-        `LogError` if one of its files was written anew since it was opened.
+        is checked if some chunks have none of their own, or the log has at most `SMALL` bytes. A
+        `LogError` if a file has changed since it was opened.
         """
         for file, before in self.states.items():
             with suppress(OSError):
@@ -155,26 +155,26 @@ class Log:
                 container.verify_data()
         lost = [str(damage) for damage in self.damage if damage.lossy]
         images = [topic for topic in self.topics if topic.is_image] if lost else []
-        return (*lost, *map(self._kept, images))
+        return (*lost, *map(self._describe_rest, images))
 
     @property
     def size(self) -> int:
         """Bytes of all its files."""
         return sum(len(container.source) for container in self.containers)
 
-    def _kept(self, topic: TopicInfo) -> str:
+    def _describe_rest(self, topic: TopicInfo) -> str:
         reader = self.readers[topic.name]
         total = max(reader.expected(), len(reader))
-        known = f" of {total}" if total > reader.readable() else ""
+        of_total = f" of {total}" if total > reader.readable() else ""
         until = (topic.last_ns or self.start_ns) - self.start_ns
-        return f"{topic.name}: {reader.readable()}{known} images kept, up to {until / NS:.3f} s"
+        return f"{topic.name}: {reader.readable()}{of_total} images kept, up to {until / NS:.3f} s"
 
     @cached_property
     def digest(self) -> str:
-        """Return the log's identity in hexadecimal, for which no message is read.
+        """The log's identity in hexadecimal, the same wherever the log lies.
 
         It is the SHA-256 of sizes, of the places and log times of messages, and of the chunks' own
-        checksums: the same wherever the log lies. A `LogError` if the disk fails.
+        checksums; no message is read. A `LogError` if the disk fails.
         """
         try:
             parts = [container.fingerprint() for container in self.containers]
@@ -183,10 +183,10 @@ class Log:
         return hashlib.sha256(b"\n".join(parts)).hexdigest()
 
     def verify(self, on_bytes: Callable[[int, int], object] | None = None) -> str | None:
-        """Read the whole log, so that `damage` knows all of it; return its SHA-256 in hexadecimal.
+        """Read the log completely, so that all damage is known; return its SHA-256 in hexadecimal.
 
-        Of a folder it is the SHA-256 of its files' sums; None if the disk fails. ``on_bytes`` is
-        called now and then with the bytes that were read, and with all that will be.
+        For a folder it is the SHA-256 of its files' SHA-256; None if the disk fails. ``on_bytes``
+        is called now and then with the bytes that were read, and with the bytes in total.
         """
         sums = {container.path: hashlib.sha256() for container in self.containers}
         done = 0
@@ -196,17 +196,17 @@ class Log:
                     sums[container.path].update(block)
                     done += size
                     if on_bytes is not None:
-                        on_bytes(done, 2 * self.size)  # chunk by chunk, and as a whole for the sum
+                        on_bytes(done, 2 * self.size)  # the log is read by chunks, then in blocks
             except BadRecord:
                 return None
         parts = [digest.hexdigest() for digest in sums.values()]
         return parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
 
     def select(self) -> Selection:
-        """Settle what to replay: what is asked for, and the rest where the log leaves no doubt.
+        """Choose what to replay: what the settings name, else what the log leaves no doubt about.
 
         Another log that holds masks stays open as long as this one. A `LogError` if a topic is
-        missing or the choice is not plain, a label value does not occur or cannot be understood, a
+        missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
         label image has another size, or no mask belongs to a frame.
         """
         try:
@@ -221,7 +221,7 @@ class Log:
         return replace(selection, labels={**selection.labels, **masks})
 
     def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> LabelSource:
-        """Settle masks that lie beside the log; words on them name their variant's settings."""
+        """Read masks that lie beside the log; their messages name the settings of their variant."""
 
         def of_variant(text: str) -> str:
             text = text.replace("`labels.", f"`masks.{name}.labels.")
@@ -246,7 +246,7 @@ class Log:
     def _beside_log(
         self, settings: MaskSettings, selection: Selection, offset_ms: float = 0.0
     ) -> LabelSource:
-        """Settle labels of a folder, of an annotation tool's file, or of another log."""
+        """Read labels of a folder, of an annotation tool's file, or of another log."""
         log, topic = log_and_topic(settings.path)
         camera, images = selection.camera, selection.camera.images
         if log is None:
@@ -255,8 +255,10 @@ class Log:
                 names = [shown_name(label.path, settings.path) for label in origin.labels]
                 check_names(names, camera.topic, self.topics)
             count = len(images) if images.sure == images.expected() == len(images) else None
-            labels = with_keys(origin, settings.path, settings, images.limits, count)
-            return beside_log(labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms)
+            labels = find_keys(origin, settings.path, settings, images.limits, count)
+            return source_beside_log(
+                labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms
+            )
         other = open_log(log, LogConfig(frames=self.config.frames))
         self.beside.append(other)
         if topic is None:
@@ -266,23 +268,25 @@ class Log:
             topic = choice.topic.name
         reader = other.readers[named(other.topics, topic, "topic").name]
         name = "" if other.path.resolve() == self.path.resolve() else other.name
-        return beside_log(reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms)
+        return source_beside_log(
+            reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms
+        )
 
     def for_camera(self, config: LogConfig) -> Log:
-        """Return the same open log with what is asked of one camera of several."""
+        """Return the same open log with the settings of one camera of a rig."""
         return replace(self, config=config, of_rig=True)
 
     def frames(
         self, selection: Selection, only: Collection[int] | None = None, *, labelled: bool = False
     ) -> FrameStream:
-        """Read the frames of a selection that are asked for, by log time; each call begins anew.
+        """Read the frames of a selection by log time; each call begins anew.
 
-        ``only`` are the numbers of some of them, which alone are read then; or the ``labelled``
-        ones alone. A `LogError` if there is none in the range.
+        ``only`` are the numbers of the frames to read; ``labelled`` reads labelled frames only. A
+        `LogError` if there is none in the range.
         """
-        asked, images, truth = self.config.frames, selection.camera.images, selection.truth
+        settings, images, truth = self.config.frames, selection.camera.images, selection.truth
         times, bounds = images.log_times, [0, len(images)]
-        for place, time in enumerate((asked.start, asked.end)):
+        for place, time in enumerate((settings.start, settings.end)):
             if time is not None:
                 bounds[place] = int(np.searchsorted(times, parse_time(time, self.start_ns)))
         first, last = bounds
@@ -293,27 +297,27 @@ class Log:
                 f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
             )
         numbers: Sequence[int] = range(first, last)
-        most = asked.every * (asked.max_frames or last)
+        most = settings.every * (settings.max_frames or last)
         if (camera := self.config.topics.frame_id) is not None:
             of_camera = (number for number in numbers if images.frame_id(number) == camera)
-            numbers = [*(of_camera if asked.labelled else islice(of_camera, most))]
+            numbers = [*(of_camera if settings.labelled else islice(of_camera, most))]
             if not numbers:
                 raise LogError(
                     f"{self.path.name}: `topics.frame_id` {camera}: no image of the range has it; "
                     f"the first has {images.frame_id(first) or 'none'}"
                 )
-        if asked.labelled:
-            numbers = [*islice(with_label(truth, images, numbers), most)] if truth else []
+        if settings.labelled:
+            numbers = [*islice(labelled_numbers(truth, images, numbers), most)] if truth else []
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
                 raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
-        numbers = numbers[:: asked.every][: asked.max_frames]
+        numbers = numbers[:: settings.every][: settings.max_frames]
         if only is not None:
             numbers = [number for number in numbers if number in only]
         return FrameStream(selection, last - first, numbers, labelled=labelled)
 
     def close(self) -> None:
-        """Close the log's files, and those of logs beside it."""
+        """Close the files of the log, and of logs beside it."""
         for container in self.containers:
             container.close()
         for other in self.beside:
@@ -328,7 +332,7 @@ class Log:
 
 @dataclass(frozen=True)
 class LogDescription:
-    """The content of a log, its damage, and what a replay would pick."""
+    """The content of a log, its damage, and the choices of a replay."""
 
     path: str
     bytes: int
@@ -338,23 +342,23 @@ class LogDescription:
     """Log times of its first and last message."""
     topics: tuple[TopicInfo, ...]
     picks: tuple[str, ...]
-    """The topics that a replay would pick and why, a sentence each."""
+    """The topics that a replay would choose and why, a sentence each."""
     problem: str
-    """Why a replay could not pick, or empty."""
+    """Why a replay could not choose; empty if it could."""
     damage: tuple[str, ...]
     losses: tuple[str, ...]
     """The damage of the files, and the losses by it, a sentence each."""
     digest: str
     """The log's identity, see `Log.digest`."""
     verified: bool
-    """Whether the log was read whole: of one that was not, damage inside chunks is not known."""
+    """Whether the log was read completely; if not, damage inside chunks is unknown."""
     sha256: str | None
-    """SHA-256 of a log that was read whole, see `Log.verify`; else None."""
+    """SHA-256 of a log that was read completely, see `Log.verify`."""
     misfits: tuple[str, ...] = ()
     """How truth that lies beside the log does not fit its images, a sentence each."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it: text, numbers, lists, objects."""
+        """Return the description as JSON objects."""
         return asdict(self)
 
 
@@ -365,17 +369,17 @@ def describe(
     verify: bool = False,
     on_bytes: Callable[[int, int], object] | None = None,
 ) -> LogDescription:
-    """Describe a log by its summary and indexes, and what a replay would pick of it.
+    """Describe a log by its summary and indexes, and what a replay would choose of it.
 
-    To ``verify`` it, or where it has at most `SMALL` bytes, it is read whole, so that all damage is
-    found; ``on_bytes`` is called now and then with the bytes that were read, and with all that will
-    be. A `LogError` if it is missing, unreadable, or no MCAP log.
+    With ``verify``, or if it has at most `SMALL` bytes, it is read completely to find all damage;
+    ``on_bytes`` is that of `Log.verify`. A `LogError` if the log is missing, unreadable, or no MCAP
+    log.
     """
     with open_log(path, config) as log:
         picks, problem = tuple[str, ...](), ""
         try:
             selection = log.select()
-            picks = (*selection.reasons, *looked_at(selection))
+            picks = (*selection.reasons, *look_at_images(selection))
         except LogError as error:
             problem = str(error)
         verified = verify or log.size <= SMALL

@@ -1,4 +1,4 @@
-"""What is asked of a log: its topics, the meaning of its labels, and which frames are read."""
+"""Settings of reading a log: its topics, the meaning of its labels, and the frames to read."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ def parse_time(text: str, start_ns: int = 0) -> int:
     """Parse a moment as people write it; return nanoseconds of the clock of a log.
 
     ``2.5`` and ``90`` are seconds after the log's first message, at ``start_ns``; a whole number
-    from 1000000000 on is nanoseconds of the log's clock (below it lies the clock's first second);
-    ``12s`` and ``12ns`` say which they are; and there is ``2013-05-01T12:00:00.5Z`` (RFC 3339). A
-    `LogError` if it is none of these.
+    from 1000000000 on is nanoseconds of the log's clock; ``12s`` and ``12ns`` have a unit; and
+    ``2013-05-01T12:00:00.5Z`` is RFC 3339. A `LogError` if it is none of these.
     """
     text = text.strip()
     if match := _RFC_3339.fullmatch(text):
@@ -45,9 +44,9 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         number = int(match[1])
         return number if match[2] or number >= NS else start_ns + number * NS
     if match := re.fullmatch(r"(\d{0,19})(?:\.(\d*))?s?", text):
-        whole, fraction = match.groups("")
-        if whole or fraction:
-            return start_ns + int(whole or 0) * NS + int(fraction[:9].ljust(9, "0"))
+        seconds_text, fraction = match.groups("")
+        if seconds_text or fraction:
+            return start_ns + int(seconds_text or 0) * NS + int(fraction[:9].ljust(9, "0"))
     raise LogError(
         f"{elided(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
         "2013-05-01T12:00:00Z"
@@ -55,7 +54,7 @@ def parse_time(text: str, start_ns: int = 0) -> int:
 
 
 def _time(moment: object) -> object:
-    """Take a number, or a date that TOML knows, for its text, which must be a moment."""
+    """Return the text of a moment; in TOML it may be a number or a date as well."""
     if isinstance(moment, int | float) and not isinstance(moment, bool):
         moment = str(moment)
     if isinstance(moment, str):
@@ -78,31 +77,31 @@ Color = tuple[Level, Level, Level]
 
 @dataclass(frozen=True)
 class TopicSettings:
-    """Topics, where the log leaves a choice, and how label images are paired with images."""
+    """Topics, if the log leaves a choice, and how label images are paired with images."""
 
     image: str | None = None
-    """The camera's topic, where the log has several."""
+    """The camera's topic, if the log has several."""
     frame_id: Annotated[str | None, Flag("--frame-id", "ID")] = None
-    """Only images whose header has this ``frame_id``, where several cameras share the topic."""
+    """The ``frame_id`` in the headers of the images to read, if cameras share a topic."""
     truth: Annotated[str | None, Flag("--truth-topic", "T")] = None
-    """The topic of label images that show where road is; an empty name takes none."""
+    """The topic of label images that show where road is; an empty name means none."""
     shadow: Annotated[str | None, Flag("--shadow-topic", "T")] = None
-    """The topic of masks that show where shadow truly is; an empty name takes none."""
+    """The topic of masks that show where shadow truly is; an empty name means none."""
     masks: Annotated[Mapping[str, str], Flag("--mask-topic", "NAME=TOPIC", "Methods")] = field(
         default_factory=dict
     )
-    """Score road masks that the log carries, a network's output, say, as one more variant."""
+    """The topic of road masks, such as a network's output, that are scored as one more variant."""
     sync_tolerance_ms: Annotated[
         float | None, Interval(ge=0, le=86_400_000), Flag("--sync-tolerance", "MS")
     ] = None
-    """Milliseconds between the stamps of an image and its truth, at most. Default: half the frame
-    period."""
+    """Greatest difference in milliseconds between the stamps of an image and its truth. Default:
+    half the frame period."""
     sync_offset_ms: Annotated[
         float, Interval(ge=-86_400_000, le=86_400_000), Flag("--sync-offset", "MS")
     ] = 0.0
-    """Milliseconds to add to the stamps of the truth before it is paired: below 0 if it is late."""
+    """Milliseconds to add to the stamps of the truth before it is paired; below 0 if it is late."""
     resize_truth: Annotated[bool, Flag("--resize-truth")] = False
-    """Scale label images of another size to the image's (nearest pixel)."""
+    """Scaling of label images of another size to the image's (nearest pixel)."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class CameraSettings:
     image: Annotated[str, Len(min_length=1)]
     """The topic of its images."""
     name: str = ""
-    """What it is called in tables and in the recording. Default: its topic."""
+    """Its name in tables and in the recording. Default: its topic."""
     truth: str | None = None
     """The topic of its road truth."""
     shadow: str | None = None
@@ -120,27 +119,25 @@ class CameraSettings:
     masks: Mapping[str, str] = field(default_factory=dict)
     """Topics of masks to score as one more variant, by the variant's name."""
     ground: GroundSettings = field(default_factory=GroundSettings)
-    """Its height, angles and lens, where the log does not have them."""
+    """Its height, angles and lens, if the log lacks them."""
 
 
 @dataclass(frozen=True)
 class LabelSettings:
-    """Which values, or colours, of a label image mean road, and which are ignored.
+    """The values, or colours, of label images that mean road, and those that are ignored.
 
-    All others are non-road. With none given, a mask is understood by itself if its values are among
-    0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore. Negative
-    values mean no label: they are ignored, unless they are named.
+    All others are non-road. By default a mask has 0, 255 for road and 128 for ignore; or 0, 1 for
+    road and 255 for ignore. Negative values mean no label: they are ignored, unless they are named.
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
-    """Truth values that are road, or names of classes where the labels have names. Of an image with
-    a palette, its indices."""
+    """Truth values that mean road (in an image with a palette its indices), or names of classes."""
     ignore: Annotated[tuple[Value | Name, ...], Flag("--ignore-label", "V|NAME")] = ()
-    """Truth values, or names of classes, that are counted nowhere."""
+    """Truth values, or names of classes, that are not counted."""
     road_colors: Annotated[tuple[Color, ...], Flag("--road-color", "R,G,B")] = ()
-    """Truth colours that are road, red, green and blue."""
+    """Truth colours that mean road, as red, green and blue."""
     ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
-    """Truth colours that are counted nowhere."""
+    """Truth colours that are not counted."""
 
     def __post_init__(self) -> None:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
@@ -157,31 +154,30 @@ class LabelSettings:
 
 @dataclass(frozen=True)
 class LabelPlace:
-    """Road truth that lies beside the log, and how it belongs to the log's frames."""
+    """Road truth that lies beside the log, and how it is paired with the log's frames."""
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
-    """A folder of label images, files of an annotation tool (COCO, CVAT, LabelMe, YOLO, Label
-    Studio, Cityscapes, BDD100K, VIA), or LOG.mcap:/topic. Images may be NPY files; there is one a
-    frame. In the path ``{drive}`` is the name of the drive's file, without its ending."""
+    """A folder of label images or NPY files, one a frame; files of an annotation tool (COCO, CVAT,
+    LabelMe, YOLO, Label Studio, Cityscapes, BDD100K, VIA); or LOG.mcap:/topic. In the path
+    ``{drive}`` is the name of the drive's file without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
-    """How labels and frames belong together: by ``number``, the one by which the labels' names
-    differ; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
-    since 1970). Default: stamps of a log, and of files whose names are all times of more than ten
-    digits."""
+    """The pairing of labels with frames: by ``number``, by which the labels' names differ, or by
+    ``stamp``, if each name is a time (seconds, or milli-, micro- or nanoseconds since 1970).
+    Default: stamps for a log, and for files if all names are times of more than ten digits."""
     first: Annotated[int | None, Interval(ge=0, le=1_000_000_000), Flag("--truth-first", "N")] = (
         None
     )
-    """The number of the first frame's label. Default: what the numbers allow, if that is plain."""
+    """The number of the first frame's label. Default: the only one that the numbers allow."""
     names: Annotated[str, Flag("--truth-names", "PATTERN")] = "*"
-    """Only labels whose names match: ``left/*`` where those of several cameras lie together. In
+    """A pattern of the names of labels to read, such as ``left/*`` for one of several cameras. In
     ``*_{number}_v?.png`` the part ``{number}`` is the frame's number; ``*`` and ``?`` are any
     text and any letter."""
     images: Annotated[str | None, Flag("--truth-images", "FOLDER")] = None
-    """The folder of images that the log was made of, in their order: labels belong to the image of
-    the same name, endings such as ``_mask`` aside. It may hold ``{drive}``, too."""
+    """The folder of the images in the log, in their order: a label belongs to the image of the same
+    name, without endings such as ``_mask``. It may contain ``{drive}``."""
     skip_roadless: Annotated[bool, Flag("--skip-roadless")] = False
-    """Leave out drawn labels with shapes of other classes, but none of road. Without it such an
-    image counts as one without road."""
+    """Only drawn labels that contain road. Otherwise an image with shapes of other classes alone
+    counts as one without road."""
 
     def __post_init__(self) -> None:
         if self.images is not None and (self.pair, self.first) != (None, None):
@@ -190,16 +186,16 @@ class LabelPlace:
 
 @dataclass(frozen=True)
 class MaskSettings(LabelPlace):
-    """Another method's road masks that do not lie in the log."""
+    """Another method's road masks that lie beside the log."""
 
     threshold: Annotated[float | None, Interval(gt=0, le=1)] = None
-    """For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is a
-    share of the greatest such value; one with a fraction is from 0 to 1."""
+    """For confidence maps: the least confidence of road, from 0 to 1. Whole numbers of 8 or 16 bits
+    are divided by the greatest one."""
     decide: Literal["threshold", "trained"] = "threshold"
-    """For confidence maps: whether road is what ``threshold`` says, or what another one says that
-    is chosen on the training frames, where it errs least."""
+    """For confidence maps: ``threshold``, or ``trained`` for the one with the fewest errors on the
+    training frames."""
     labels: LabelSettings = LabelSettings()
-    """For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean."""
+    """For masks of other values than 0 and 255 (road), or 0 and 1 (road): their meaning."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -211,40 +207,41 @@ class MaskSettings(LabelPlace):
 
 @dataclass(frozen=True)
 class FrameSettings:
-    """Which frames of the log are read, and how."""
+    """The frames of the log that are read, and how they are decoded."""
 
     start: Annotated[Time | None, Flag("-S --start", "TIME")] = None
     """First time: seconds from the log's start, nanoseconds, or RFC 3339."""
     end: Annotated[Time | None, Flag("-E --end", "TIME")] = None
     """End time, exclusive."""
     every: Annotated[int, Count, Flag("--every", "N")] = 1
-    """Read every N-th frame."""
+    """Step from frame to frame: 5 reads every fifth one."""
     labelled: Annotated[bool, Flag("--labelled")] = False
-    """Read only frames that have truth. Windows are of consecutive ones of these, and flicker is
-    from one to the next, however far apart they are."""
+    """Only frames that have truth. Windows and flicker are of consecutive ones of these, however
+    far apart they are."""
     max_frames: Annotated[int | None, Count, Flag("--max-frames", "N")] = None
-    """Stop after N frames read."""
+    """Greatest number of frames to read."""
     scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0
-    """Reduce frames and truth to this share of their width and height first. It is quicker and
-    coarser, and gives other results."""
+    """Share of their width and height to which frames and truth are reduced. A smaller one is
+    quicker and coarser, and gives other results."""
     max_pixels: Annotated[int, Interval(ge=1, le=1 << 30), Flag("--max-pixels", "N", "Input")] = (
         MAX_PIXELS
     )
-    """Leave out images of more pixels. They are not decoded: a damaged head may claim any size."""
+    """Greatest number of pixels of an image. Larger images are not decoded: a damaged head may
+    claim any size."""
     unturned: Annotated[bool, Flag("--unturned", group="Input")] = False
-    """Leave images as they are stored, where their EXIF orientation, or a video's display matrix,
-    asks to turn them. Viewers and annotation tools turn them; calibrations are of the sensor."""
+    """Images as they are stored, without the turn of their EXIF orientation or a video's display
+    matrix. Viewers and annotation tools turn them; calibrations are for the sensor."""
     full_range: Annotated[bool, Flag("--full-range", group="Input")] = False
-    """Take the luma of a video to span 0 to 255, as that of converted JPEGs does, and not 16 to
-    235, which is what a video means that does not say."""
+    """A luma of 0 to 255 in videos, as in converted JPEGs, whatever they state. Default: the range
+    that a video states, else 16 to 235."""
     white: Annotated[float | None, Interval(gt=0), Flag("--white", "V", "Input")] = None
-    """The sample that is white in images of more than 8 bits. Default: the greatest of 8, 10, 12,
-    14 or 16 bits, whichever hold the samples of some of the camera's images; of fractions 1."""
+    """The sample that is white in images of more than 8 bits. Default: the greatest number of 8,
+    10, 12, 14 or 16 bits, as many as the samples of some images need; 1 for fractions."""
 
 
 @dataclass(frozen=True)
 class LogConfig:
-    """All that is asked of a log, without what becomes of its frames."""
+    """All settings of reading a log."""
 
     masks: Mapping[str, MaskSettings] = field(default_factory=dict)
     """Masks of other methods that lie beside the log, by the name of their variant."""

@@ -1,4 +1,4 @@
-"""Networks in ONNX files: what a file says of itself, its inputs and outputs, and its road mask."""
+"""Networks in ONNX files: settings, inputs and outputs, and the road mask of an image."""
 
-from roadeval.networks.network import Network, Road
+from roadeval.networks.network import Network
 from roadeval.networks.settings import NetSettings, NetworkError

@@ -1,4 +1,4 @@
-"""A network's road mask of a frame; what its settings lack is read from its file, or asked for."""
+"""A network's road mask of a frame; missing settings are read from its file, or asked for."""
 
 from __future__ import annotations
 
@@ -12,27 +12,12 @@ from typing import Any, Final, Literal, Self
 import cv2
 import numpy as np
 
-from roadeval.data import CERTAIN, Mask, Probability, Rgb
+from roadeval.data import CERTAIN, Output, Packed, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.text import visible
 from roadeval.runtime.threads import ordered
-
-
-@dataclass(frozen=True, eq=False)
-class Road:
-    """The road of a frame by a network."""
-
-    mask: Mask
-    """``(H, W)`` uint8, 1 road."""
-    codes: Probability
-    """How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1."""
-    graded: bool
-    """Whether the mask is a threshold on them; otherwise the network gives classes alone, and they
-    are 0 and 65535."""
-    by_class: tuple[Probability, ...] = ()
-    """The codes of each class of road, where there are several and they are graded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,83 +27,85 @@ class Network:
     settings: NetSettings
     file: OnnxFile
     shapes: tuple[tuple[int, ...], ...]
-    """Notes on its outputs, which hold for every frame."""
+    """Shapes of its outputs, which hold for every frame."""
 
     @classmethod
     def of(cls, settings: NetSettings) -> Self:
         """Open the network of some settings.
 
-        A `NetworkError` if it cannot be used, or settings are missing that its file does not hold
-        either.
+        A `NetworkError` if it cannot be used, or a setting stands neither here nor in its file.
         """
         file = load(settings)
-        settings = completed(settings, file)
+        settings = complete_settings(settings, file)
         return cls(settings, file, tuple(sample.shape for sample in samples_of(settings, file)))
 
-    def road(self, image: Rgb) -> Road:
+    def road(self, image: Rgb) -> Output:
         """Find the road in an ``(H, W, 3)`` uint8 RGB image.
 
-        What the network gives of a class, a logit or a probability, is interpolated linearly to the
-        frame's size; classes alone are brought there by the nearest pixel. With several outputs the
-        probability of road is the greatest of theirs. A `NetworkError` if the network fails on it,
-        or gives NaN or another shape than for other images.
+        Logits and probabilities of a class are interpolated linearly to the frame's size; numbers
+        of classes are resized to the nearest pixel. With several outputs the probability of road is
+        the greatest of theirs. The output has no probabilities if the network gives only classes. A
+        `NetworkError` if the network fails on the image, or gives NaN or another shape than for
+        other images.
         """
         settings = self.settings
         frame = image.shape[1], image.shape[0]
-        values = input_values(placed(image, settings), settings, self.file.inputs[0].dtype)
+        values = input_values(fit_image(image, settings), settings, self.file.inputs[0].dtype)
         outputs = self.file.run(values, settings.outputs or (), settings.seconds)
         for name, output, shape in zip(settings.outputs or (), outputs, self.shapes, strict=True):
             if output.shape != shape:
                 raise self.file.error(_VARIES.format(name, output.shape, shape))
-        probable = [self._codes(output, frame) for output in outputs]
-        codes = np.maximum.reduce([total for total, _ in probable])
+        pairs = [self._codes(output, frame) for output in outputs]
+        codes = np.maximum.reduce([total for total, _ in pairs])
         limit = round((0.5 if settings.threshold is None else settings.threshold) * CERTAIN)
-        by_class = tuple(chain(*zip(*(alone for _, alone in probable), strict=True)))
-        graded = settings.activation != "classes"
-        mask = (codes > limit).astype(np.uint8)
-        return Road(mask, codes, graded, by_class if len(by_class) > 1 else ())
+        by_class = tuple(chain(*zip(*(single for _, single in pairs), strict=True)))
+        return Output(
+            mask=Packed.of(codes > limit),
+            probability=None if settings.activation == "classes" else codes,
+            by_class=by_class if len(by_class) > 1 else (),
+        )
 
     def facts(self) -> Mapping[str, Any]:
         """Return facts about the network for results, beside its settings."""
         from onnxruntime import __version__
 
-        named = self.file.metadata.get("license") or self.file.metadata.get("licence") or ""
+        licence = self.file.metadata.get("license") or self.file.metadata.get("licence") or ""
         return {
             "onnxruntime": __version__,
             "file": self.file.path.name,
             "sha256": self.file.sha256,
-            "licence": visible(" ".join(named.split())) or None,
-            "inputs": [str(each) for each in self.file.inputs],
-            "outputs": [str(each) for each in self.file.outputs],
+            "licence": visible(" ".join(licence.split())) or None,
+            "inputs": [*map(str, self.file.inputs)],
+            "outputs": [*map(str, self.file.outputs)],
             "taken_for": TAKEN_FOR.get(self.settings.activation or "", "logits"),
             "road": [*map(str, self.settings.road or ())],
         }
 
     def _codes(self, output: Array, frame: Size) -> tuple[Probability, list[Probability]]:
-        """Return the codes of road, and those of each of its classes, where they are graded."""
+        """Return the codes of road, and the codes of each of its classes, if they are graded."""
         settings = self.settings
         scores = as_scores(output, settings.layout)
         assert scores is not None
         if not np.isfinite(scores).all():
             if np.isnan(scores).any():
                 raise self.file.error("gives NaN")
-            scores = np.clip(scores, -HUGE, HUGE)  # infinity times nothing would be NaN
-        if settings.activation == "none" and not _within_one(scores.min(), scores.max()):
+            scores = np.clip(scores, -HUGE, HUGE)  # infinity times 0 would be NaN
+        if settings.activation == "none" and not is_probable(scores.min(), scores.max()):
             raise self.file.error("leaves 0 to 1: it gives no probabilities, see `net.activation`")
         if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
             nearest = cv2.INTER_NEAREST if is_ultralytics(self.file) else cv2.INTER_NEAREST_EXACT
-            return brought_back(CERTAIN * road, frame, settings, nearest), []
+            return resize_to_frame(CERTAIN * road, frame, settings, nearest), []
 
         def plane(number: int) -> Values:
-            own = scores[number].astype(np.float32)
-            return brought_back(own, frame, settings, cv2.INTER_LINEAR)
+            values = scores[number].astype(np.float32)
+            return resize_to_frame(values, frame, settings, cv2.INTER_LINEAR)
 
         def coded(shares: Values) -> Probability:
             return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
 
-        total, alone = road_probability(plane, len(scores), settings)
-        return coded(total), [coded(shares) for shares in alone]
+        total, single = road_probability(plane, len(scores), settings)
+        return coded(total), [*map(coded, single)]
 
 
 HUGE: Final = 3e4
@@ -130,12 +117,12 @@ TAKEN_FOR: Final = {"none": "probabilities", "classes": "classes"}
 def road_probability(
     plane: Callable[[int], Values], count: int, settings: NetSettings
 ) -> tuple[Values, list[Values]]:
-    """Compute how probable road and each of its classes are, float32 in 0..1.
+    """Compute the probabilities of road and of each of its classes, float32 in 0..1.
 
-    ``plane`` returns the scores of a class by its number. For ``argmax`` it is road against the
-    rest: the best class of road against the best other one, so that the mask is where it is above
-    one half. For ``threshold`` it is the sum over the classes of road, and of a ``sigmoid`` the
-    greatest of them.
+    ``plane`` returns the scores of a class by its number. With ``argmax`` the probability is that
+    of the best class of road against the best other one, so that road is where it is above one
+    half. With ``threshold`` it is the sum over the classes of road, for a ``sigmoid`` their
+    greatest.
     """
     numbers = settings.road or ()
     road = [plane(number) for number in numbers]
@@ -143,13 +130,16 @@ def road_probability(
     best = reduce(np.maximum, road)
     if settings.decide != "argmax" and settings.activation != "softmax":
         if settings.activation == "sigmoid":
-            return sigmoid(best), [sigmoid(own) for own in road]
+            return sigmoid(best), [*map(sigmoid, road)]
         return reduce(np.add, road), road
     rest = reduce(np.maximum, map(plane, others), np.full_like(best, -HUGE))
     if settings.decide == "argmax":
 
         def against(one: Values, other: Values) -> Values:
-            return _share(one, other) if settings.activation == "none" else sigmoid(one - other)
+            if settings.activation != "none":
+                return sigmoid(one - other)
+            total = one + other
+            return np.divide(one, total, out=np.zeros_like(one), where=total > 0)
 
         rivals = [
             reduce(np.maximum, [*road[:place], *road[place + 1 :]], rest)
@@ -157,15 +147,10 @@ def road_probability(
         ]
         return against(best, rest), [*map(against, road, rivals)]
     most = np.maximum(best, rest)
-    powers: list[Values] = [np.exp(own - most) for own in road]
-    whole = reduce(np.add, chain(powers, (np.exp(plane(number) - most) for number in others)))
-    shares: list[Values] = [power / whole for power in powers]
+    powers: list[Values] = [np.exp(scores - most) for scores in road]
+    total = reduce(np.add, chain(powers, (np.exp(plane(number) - most) for number in others)))
+    shares: list[Values] = [power / total for power in powers]
     return reduce(np.add, shares), shares
-
-
-def _share(one: Values, other: Values) -> Values:
-    total = one + other
-    return np.divide(one, total, out=np.zeros_like(one), where=total > 0)
 
 
 GREY: Final = 114
@@ -176,33 +161,38 @@ Size = tuple[int, int]
 
 
 def inside(frame: Size, settings: NetSettings) -> tuple[slice, slice]:
-    """Return the rows and columns of the input where a frame lies: in the middle."""
+    """Return the rows and columns of a frame in the input: they are in the middle."""
     assert settings.size is not None
     width, height = settings.size
     if settings.resize == "stretch":
         return slice(height), slice(width)
     ratio = min(width / frame[0], height / frame[1])
-    inner = (max(1, round(side * ratio)) for side in frame)
-    starts = [((whole - side) // 2, side) for whole, side in zip(settings.size, inner, strict=True)]
-    columns, rows = (slice(start, start + side) for start, side in starts)
+    columns, rows = (
+        slice((full - side) // 2, (full - side) // 2 + side)
+        for full, side in zip(
+            settings.size, (max(1, round(side * ratio)) for side in frame), strict=True
+        )
+    )
     return rows, columns
 
 
-def placed(image: Rgb, settings: NetSettings) -> Rgb:
-    """Return the input's pixels, ``(h, w, 3)`` uint8, of an ``(H, W, 3)`` uint8 frame."""
+def fit_image(image: Rgb, settings: NetSettings) -> Rgb:
+    """Return the input's pixels, ``(h, w, 3)`` uint8, for an ``(H, W, 3)`` uint8 frame."""
     assert settings.size is not None
-    whole = np.full((*settings.size[::-1], 3), GREY, np.uint8)
-    there = whole[inside((image.shape[1], image.shape[0]), settings)]
+    pixels = np.full((*settings.size[::-1], 3), GREY, np.uint8)
+    inner = pixels[inside((image.shape[1], image.shape[0]), settings)]
     if not settings.antialias:
-        there[...] = cv2.resize(image, there.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-        return whole
-    down, right = (_means(*sides) for sides in zip(image.shape[:2], there.shape[:2], strict=True))
+        inner[...] = cv2.resize(image, inner.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+        return pixels
+    down, right = (
+        bilinear_weights(*sides) for sides in zip(image.shape[:2], inner.shape[:2], strict=True)
+    )
     across = np.rint(np.matmul(right, image.astype(np.float32)))
-    there[...] = np.rint(np.tensordot(down, across, 1))
-    return whole
+    inner[...] = np.rint(np.tensordot(down, across, 1))
+    return pixels
 
 
-def _means(length: int, to: int) -> Values:
+def bilinear_weights(length: int, to: int) -> Values:
     """Return the ``(to, length)`` weights of Pillow's bilinear filter, a triangle."""
     ratio = length / to
     middle = (np.arange(to)[:, None] + 0.5) * ratio
@@ -211,24 +201,25 @@ def _means(length: int, to: int) -> Values:
     return shares
 
 
-def brought_back(plane: Array, frame: Size, settings: NetSettings, how: int) -> Array:
-    """Bring an ``(h, w)`` map of the input, or a smaller one of all of it, to the frame's size."""
+def resize_to_frame(plane: Array, frame: Size, settings: NetSettings, how: int) -> Array:
+    """Resize an ``(h, w)`` map of the input, which may be smaller, to the frame's size."""
     if settings.resize != "stretch":
-        whole = cv2.resize(plane, settings.size, interpolation=how)
-        plane = np.ascontiguousarray(whole[inside(frame, settings)])
+        plane = cv2.resize(plane, settings.size, interpolation=how)
+        plane = np.ascontiguousarray(plane[inside(frame, settings)])
     return cv2.resize(plane, frame, interpolation=how)
 
 
 def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
     """Compute ``(level scale - mean) / deviation`` of an ``(h, w, 3)`` uint8 RGB image.
 
-    The image has the input's size, the settings are complete; whole numbers are rounded.
+    The image has the input's size, the settings are complete; integers are rounded.
     """
     if settings.channels == "bgr":
         image = image[..., ::-1]
     elif settings.channels == "grey":
         image = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)[..., None]
-    mean, deviation = (np.array(each, np.float64) for each in (settings.mean, settings.deviation))
+    mean = np.array(settings.mean, np.float64)
+    deviation = np.array(settings.deviation, np.float64)
     factor = (np.float64(settings.scale or 1) / deviation).astype(np.float32)
     values = image * factor - (mean / deviation).astype(np.float32)
     if np.dtype(dtype).kind == "u":
@@ -241,13 +232,13 @@ FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
 
 
-def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
+def complete_settings(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """Return settings without any missing value.
 
-    A `NetworkError` if the network cannot be used, or a value cannot be read from its file: one
-    line that asks for it and lists the network's inputs and outputs.
+    A `NetworkError` if the network cannot be used, or a value cannot be read from its file: it asks
+    for the value and lists the network's inputs and outputs.
     """
-    if settings.outputs is None and _has_instances(file):
+    if settings.outputs is None and has_instances(file):
         raise file.question(
             "finds instances, as boxes or queries with masks, and gives no map of classes: export "
             "a network for semantic segmentation (of Ultralytics one called -sem), or name an "
@@ -255,26 +246,26 @@ def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
         )
     usual: Literal["stretch", "letterbox"] = "letterbox" if is_ultralytics(file) else "stretch"
     settings = replace(settings, sha256=file.sha256, resize=settings.resize or usual)
-    settings = _input(settings, file)
-    known = tuple(output.name for output in file.outputs)
-    if settings.outputs is None and len(known) > 1:
+    settings = complete_input(settings, file)
+    names = tuple(output.name for output in file.outputs)
+    if settings.outputs is None and len(names) > 1:
         raise file.question("gives several outputs: name those that show road by `net.outputs`")
-    outputs = settings.outputs or known
-    if unknown := [name for name in outputs if name not in known]:
+    outputs = settings.outputs or names
+    if unknown := [name for name in outputs if name not in names]:
         raise file.question(f"has no output {unknown[0]!r}: see `net.outputs`")
     settings = replace(settings, outputs=outputs)
-    made = [
-        _meaning(settings, file, name, sample)
+    by_output = [
+        complete_output(settings, file, name, sample)
         for name, sample in zip(outputs, samples_of(settings, file), strict=True)
     ]
-    if any(settings != made[0] for settings in made):
+    if any(settings != by_output[0] for settings in by_output):
         raise file.question("its outputs differ in kind: name some of one kind by `net.outputs`")
-    return made[-1]
+    return by_output[0]
 
 
 @dataclass(frozen=True)
 class Sample:
-    """An output's values on the test images: its range, and whether they are whole numbers."""
+    """An output's values on the test images: its range, and whether they are integers."""
 
     shape: tuple[int, ...]
     kind: str
@@ -282,8 +273,8 @@ class Sample:
     low: float
     high: float
     """Its least and greatest number."""
-    whole: bool
-    """Whether all its numbers are whole."""
+    integral: bool
+    """Whether all its numbers are integers."""
     several: bool
     """Whether it had more numbers than `MOST_CLASSES`."""
 
@@ -292,25 +283,26 @@ class Sample:
         """Sum up an output on several images."""
         kind = arrays[0].dtype.kind
         several = kind in "iu" and len(np.unique(arrays)) > MOST_CLASSES
-        whole = all((array == np.rint(array)).all() for array in arrays)
+        integral = all((array == np.rint(array)).all() for array in arrays)
         filled = [array for array in arrays if array.size]
         low = min((float(np.fmin.reduce(array, None)) for array in filled), default=0.0)
         high = max((float(np.fmax.reduce(array, None)) for array in filled), default=0.0)
-        return cls(arrays[0].shape, kind, low, high, whole, several)
+        return cls(arrays[0].shape, kind, low, high, integral, several)
 
 
 MOST_CLASSES: Final = 64
-"""Classes that images for testing may show; whole numbers that are more are quantised ones."""
+"""Classes that test images may show; more different integers are quantised scores."""
 SLACK: Final = 1 / 64
 """How far a quantised probability may lie outside 0 to 1."""
 
 
-def _within_one(low: float, high: float) -> bool:
+def is_probable(low: float, high: float) -> bool:
+    """Return whether a range is that of probabilities, maybe quantised ones."""
     return low >= -SLACK and high <= 1 + SLACK
 
 
 def samples_of(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
-    """Return what the outputs are on images for testing; a `NetworkError` if the network fails."""
+    """Return samples of the outputs on test images; a `NetworkError` if the network fails."""
     alike = replace(settings, road=None, activation=None, decide=None, threshold=None)
     return _samples(alike, file)
 
@@ -318,34 +310,34 @@ def samples_of(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
 @lru_cache(maxsize=8)
 def _samples(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
     limit, outputs = settings.megabytes * MIB, settings.outputs or ()
-    named = {tensor.name: tensor for tensor in file.outputs}
-    shaped = replace(file.inputs[0], shape=settings.input_shape)
-    for tensor in (shaped, *(named[name] for name in outputs)):
-        file.check_size(tensor, limit)
+    by_name = {tensor.name: tensor for tensor in file.outputs}
+    file.check_size(replace(file.inputs[0], shape=settings.input_shape), limit)
+    for name in outputs:
+        file.check_size(by_name[name], limit)
 
     def run(image: Rgb) -> list[Array]:
         values = input_values(image, settings, file.inputs[0].dtype)
-        found = file.run(values, outputs, settings.seconds, WORKING * limit)
-        for name, array in zip(outputs, found, strict=True):
+        arrays = file.run(values, outputs, settings.seconds, WORKING * limit)
+        for name, array in zip(outputs, arrays, strict=True):
             file.check_size(Tensor(name, str(array.dtype), array.shape), limit)
-        return found
+        return arrays
 
     # In a thread, so that a signal is heard meanwhile.
-    arrays = [*zip(*ordered(run, _test_images(settings), 1), strict=True)]
-    for name, own in zip(outputs, arrays, strict=True):
-        if len({array.shape for array in own}) > 1:
-            raise file.error(_VARIES.format(name, own[1].shape, own[0].shape))
-    return tuple(map(Sample.of, arrays))
+    by_output = [*zip(*ordered(run, make_test_images(settings), 1), strict=True)]
+    for name, arrays in zip(outputs, by_output, strict=True):
+        if len({array.shape for array in arrays}) > 1:
+            raise file.error(_VARIES.format(name, arrays[1].shape, arrays[0].shape))
+    return tuple(map(Sample.of, by_output))
 
 
 WORKING: Final = 8
-"""Times the memory of an output that a network may take while it computes."""
+"""Factor of an output's memory that a network may take while it computes."""
 _VARIES: Final = (
     "the shape of its output {!r} depends on the image ({} and {}): export it with a fixed one"
 )
 
 
-def _test_images(settings: NetSettings) -> Iterator[Rgb]:
+def make_test_images(settings: NetSettings) -> Iterator[Rgb]:
     """Yield a black image, and two with saturated colours in large and in small spots."""
     assert settings.size is not None
     yield np.zeros((*settings.size[::-1], 3), np.uint8)
@@ -356,14 +348,14 @@ def _test_images(settings: NetSettings) -> Iterator[Rgb]:
 
 
 def is_ultralytics(file: OnnxFile) -> bool:
-    """Return whether Ultralytics has made a file, as its metadata say."""
+    """Return whether a file comes from Ultralytics, by its metadata."""
     return file.metadata.get("author") == "Ultralytics"
 
 
-def _has_instances(file: OnnxFile) -> bool:
+def has_instances(file: OnnxFile) -> bool:
     """Return whether a file finds objects one by one, by its metadata or its outputs.
 
-    Then it has a list of objects beside masks: an output of three lengths that is no map.
+    Such a file has a list of objects beside masks: an output of three lengths that is no map.
     """
     names = " ".join(tensor.name.lower() for tensor in file.outputs)
     shapes = [tensor.shape for tensor in file.outputs]
@@ -375,8 +367,8 @@ def _has_instances(file: OnnxFile) -> bool:
     )
 
 
-def _class_names(file: OnnxFile) -> dict[int, str]:
-    """Return the names of classes by number, as a file's metadata give them."""
+def class_names(file: OnnxFile) -> dict[int, str]:
+    """Return the names of classes by number, from a file's metadata."""
     try:
         names = dict(ast.literal_eval(file.metadata.get("names", "{}")))
         return {int(number): str(name).lower() for number, name in names.items()}
@@ -385,10 +377,10 @@ def _class_names(file: OnnxFile) -> dict[int, str]:
 
 
 def as_scores(output: Array, layout: str | None) -> Array | None:
-    """Return an output as classes, rows and columns; None where it is no map of the image.
+    """Return an output as classes, rows and columns; None if it is no map of the image.
 
-    It is of one image, ``(1, C, h, w)``, or ``(1, h, w, C)`` where the input's layout is ``NHWC``,
-    or without the length of 1, or without classes.
+    A map is ``(1, C, h, w)``, or ``(1, h, w, C)`` if the input's layout is ``NHWC``; the length of
+    1, or the classes, may be absent.
     """
     array = output[0] if output.ndim > 2 and len(output) == 1 else output
     if array.ndim == 3 and layout == "NHWC" and len(array) != 1:
@@ -398,8 +390,8 @@ def as_scores(output: Array, layout: str | None) -> Array | None:
     return array if array.ndim == 3 and len(array) and min(array.shape[1:]) > 1 else None
 
 
-def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """Complete all that is said of the input."""
+def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
+    """Complete the settings of the input."""
     shape = file.inputs[0].shape if len(file.inputs) == 1 else ()
     if len(shape) != 4 or shape[0] not in (None, 1) or file.inputs[0].dtype not in FED:
         raise file.question("takes no image: that is one input of four lengths, the first one 1")
@@ -423,43 +415,47 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
         mean=settings.mean or (0.0,),
         deviation=settings.deviation or (1.0,),
     )
-    if count not in (None, own := settings.channel_count):
-        raise file.question(f"its input has {count} channels, and {settings.channels} has {own}")
+    if count not in (None, expected := settings.channel_count):
+        raise file.question(
+            f"its input has {count} channels, and {settings.channels} has {expected}"
+        )
     for name in ("mean", "deviation"):
-        if len(getattr(settings, name)) not in (1, own):
+        if len(getattr(settings, name)) not in (1, expected):
             raise file.error(
-                f"`net.{name}` must hold one number, or one for each of {own} channels"
+                f"`net.{name}` must hold one number, or one for each of {expected} channels"
             )
     return settings
 
 
-def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -> NetSettings:
-    """Complete what an output means, by what it is on images for testing."""
+def complete_output(
+    settings: NetSettings, file: OnnxFile, name: str, sample: Sample
+) -> NetSettings:
+    """Complete the settings of an output, by its sample on test images."""
     assert settings.size is not None
     width, height = settings.size
     scores = as_scores(np.broadcast_to(np.int8(), sample.shape), settings.layout)
     count, rows, columns = (0, 0, 0) if scores is None else scores.shape
-    is_whole = sample.kind in "iub"
+    is_integer = sample.kind in "iub"
     # Class maps are often cast to float.
-    guessed = sample.whole and 0 <= sample.low <= sample.high > 0 and count == 1
-    is_classes = is_whole or (settings.activation or ("classes" * guessed)) == "classes"
-    # It has about the proportions of the input, and numbers of classes in one channel.
+    guessed = sample.integral and 0 <= sample.low <= sample.high > 0 and count == 1
+    is_classes = is_integer or (settings.activation or ("classes" * guessed)) == "classes"
+    # A map has about the proportions of the input; numbers of classes fill one channel.
     is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
     if not is_map or (is_classes and count != 1):
         raise file.question(f"its output {name!r} is no map of the image, but {sample.shape}")
     is_scored = sample.low < 0 or sample.several or settings.activation in ("sigmoid", "softmax")
-    if is_whole and is_scored:
+    if is_integer and is_scored:
         raise file.question(
             f"its output {name!r} holds whole numbers that look like quantised scores, and not "
             "like classes: end the network with DequantizeLinear"
         )
     if is_classes:
-        return _of_classes(settings, file, name)
-    is_probability = _within_one(sample.low, sample.high)
+        return complete_classes(settings, file, name)
     usual: Literal["none", "sigmoid", "softmax"] = "sigmoid" if count == 1 else "softmax"
+    usual = "none" if is_probable(sample.low, sample.high) else usual
     above = settings.threshold is not None or count == 1
     decide = settings.decide or ("threshold" if above else "argmax")
-    named = tuple(n for n, name in _class_names(file).items() if name == "road" and n < count)
+    named = tuple(n for n, name in class_names(file).items() if name == "road" and n < count)
     road = settings.road or named or ((count - 1,) if count <= 2 else ())
     if not road:
         raise file.question(
@@ -469,26 +465,26 @@ def _meaning(settings: NetSettings, file: OnnxFile, name: str, sample: Sample) -
         raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
     if decide == "argmax" and len(road) == count:
         raise file.question(
-            f"all classes of its output {name!r} are road, which then beat no other: see "
+            f"all classes of its output {name!r} are road; name at least one that is not: see "
             "`net.road` and `net.decide`"
         )
     return replace(
         settings,
         road=road,
-        activation=settings.activation or ("none" if is_probability else usual),
+        activation=settings.activation or usual,
         decide=decide,
         threshold=0.5 if settings.threshold is None else settings.threshold,
     )
 
 
-def _of_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings:
-    """Complete settings of a network whose output holds numbers of classes."""
+def complete_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings:
+    """Complete the settings of a network whose output holds numbers of classes."""
     if settings.threshold is not None:
-        raise file.question(f"its output {name!r} is of classes alone: leave `net.threshold` out")
-    names = _class_names(file)
+        raise file.question(f"its output {name!r} holds only classes: leave `net.threshold` out")
+    names = class_names(file)
     road = settings.road or tuple(n for n, name in names.items() if name == "road")
     if is_ultralytics(file) and len(names) == 1:
-        road = (1,)  # of a single class it writes 1, whatever number the class has
+        road = (1,)  # a single class is written as 1, whatever its number is
     if not road:
         raise file.question("give the numbers of the classes that are road by `net.road`")
     return replace(settings, road=road, activation="classes", decide="argmax")

@@ -1,4 +1,4 @@
-"""An ONNX file: what it takes and gives, its digest, and its outputs, by onnxruntime."""
+"""An ONNX file run by onnxruntime: its inputs, outputs and digest."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from roadeval.networks.settings import MIB, NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
-from roadeval.runtime.threads import ended
+from roadeval.runtime.threads import time_limit
 
 Array = npt.NDArray[Any]
 
 LEAST_OPENING_S: Final = 30.0
 """Seconds that a file may take to open, however few an image may take."""
 QUOTED: Final = 240
-"""Letters of onnxruntime's complaint that a message quotes."""
+"""Letters of onnxruntime's error that a message quotes."""
 LARGEST: Final = (1 << 31) - 1
 """Bytes that a protobuf file can have; larger weights lie in files beside it."""
 _SHOWN: Final = 12
@@ -54,16 +54,16 @@ class Tensor:
 
     name: str
     dtype: str
-    """As NumPy calls it, where it has one."""
+    """NumPy's name of its type; onnxruntime's if NumPy lacks the type."""
     shape: tuple[int | None, ...]
-    """None where a length is left open."""
+    """Its lengths; None for a variable one."""
 
     @classmethod
-    def of(cls, found: Any) -> Tensor:
+    def of(cls, described: Any) -> Tensor:
         """Convert onnxruntime's description."""
-        kind = found.type.removeprefix("tensor(").removesuffix(")")
-        sizes = tuple(n if isinstance(n, int) and n > 0 else None for n in found.shape)
-        return cls(found.name, {"float": "float32", "double": "float64"}.get(kind, kind), sizes)
+        kind = described.type.removeprefix("tensor(").removesuffix(")")
+        sizes = tuple(n if isinstance(n, int) and n > 0 else None for n in described.shape)
+        return cls(described.name, {"float": "float32", "double": "float64"}.get(kind, kind), sizes)
 
     def __str__(self) -> str:
         sizes = ", ".join("?" if size is None else str(size) for size in self.shape)
@@ -77,10 +77,10 @@ class OnnxFile:
     path: Path
     session: Any
     sha256: str
-    """Of its bytes; where weights lie in files beside it, of its bytes and theirs, in the order of
-    those files' names."""
+    """Digest of its bytes, followed by the bytes of weight files beside it in the order of their
+    names."""
     inputs: tuple[Tensor, ...]
-    """What it takes, without its weights."""
+    """Its inputs, without its weights."""
     outputs: tuple[Tensor, ...]
     metadata: Mapping[str, str]
 
@@ -96,9 +96,9 @@ class OnnxFile:
 
         options = RunOptions()
         options.log_severity_level = 4
-        with ended(partial(setattr, options, "terminate", True), seconds, grown) as late:
+        with time_limit(partial(setattr, options, "terminate", True), seconds, grown) as late:
             try:
-                with _explained(self.path):
+                with explaining(self.path):
                     arrays = self.session.run(outputs, {self.inputs[0].name: values}, options)
             except NetworkError as error:
                 if late.is_set():
@@ -112,7 +112,7 @@ class OnnxFile:
 
     def check_size(self, tensor: Tensor, limit: int) -> None:
         """Raise a `NetworkError` if an input or an output takes more bytes than the limit."""
-        with suppress(TypeError):  # of a type that NumPy lacks, which is refused once it is there
+        with suppress(TypeError):  # NumPy lacks the type, and an array of it is refused later
             size = math.prod(n or 1 for n in tensor.shape) * np.dtype(tensor.dtype).itemsize
             if size > limit:
                 raise self.error(
@@ -124,27 +124,28 @@ class OnnxFile:
         """Return an error about the file."""
         return NetworkError(f"{self.path}: {problem}")
 
-    def question(self, what: str) -> NetworkError:
-        """Return an error that asks for what the file leaves open, and lists what it has."""
-        inputs, outputs = (first_of([*map(str, e)], _SHOWN) for e in (self.inputs, self.outputs))
-        return self.error(f"{what} (inputs: {inputs}; outputs: {outputs})")
+    def question(self, problem: str) -> NetworkError:
+        """Return an error that asks for a missing setting, and lists inputs and outputs."""
+        inputs = first_of([*map(str, self.inputs)], _SHOWN)
+        outputs = first_of([*map(str, self.outputs)], _SHOWN)
+        return self.error(f"{problem} (inputs: {inputs}; outputs: {outputs})")
 
 
 def load(settings: NetSettings) -> OnnxFile:
     """Open the network of some settings; one whose file did not change stays open.
 
-    A `NetworkError` if the file cannot be used, or is not the one whose SHA-256 the settings state.
+    A `NetworkError` if the file cannot be used, or its SHA-256 is not that of the settings.
     """
     if not settings.file:
         raise NetworkError("`net.file` names no network: give the path of an ONNX file")
     path = Path(settings.file)
-    with _readable(path, "cannot read the network"):
+    with reading(path, "cannot read the network"):
         check_input(path)
-        there = path.stat()
-    if there.st_size > LARGEST:
+        status = path.stat()
+    if status.st_size > LARGEST:
         raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
-    state = there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns
-    file = _opened(path, settings.seconds, *state)
+    state = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+    file = _open(path, settings.seconds, *state)
     if settings.sha256 not in (None, file.sha256):
         raise file.error(
             f"is another network than was asked for: its SHA-256 is {file.sha256}, and "
@@ -154,10 +155,10 @@ def load(settings: NetSettings) -> OnnxFile:
 
 
 @lru_cache(maxsize=4)
-def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
+def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
     import onnxruntime
 
-    with _readable(path, "cannot read the network"):
+    with reading(path, "cannot read the network"):
         content = path.read_bytes()
     try:
         model = memoryview(content)
@@ -169,13 +170,13 @@ def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
         inner = PurePosixPath(name)
         if inner.is_absolute() or ".." in inner.parts or "\\" in name or ":" in name:
             raise NetworkError(f"{path}: asks for weights outside its folder: {visible(name)}")
-        with _readable(path, f"its weights lie in {visible(name)} beside it, which cannot be read"):
+        with reading(path, f"its weights lie in {visible(name)} beside it, which cannot be read"):
             check_input(path.parent / inner)
             with (path.parent / inner).open("rb") as file:
                 while block := file.read(1 << 20):
                     digest.update(block)
     # Some damaged files end the process that opens them, so another process opens them first.
-    # -P: an onnxruntime.py that lies beside the network must not be what is imported.
+    # With -P an onnxruntime.py beside the network is not imported.
     probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
     # 1 is an exception, which is raised again below.
     seconds = max(seconds, LEAST_OPENING_S)
@@ -187,30 +188,29 @@ def _opened(path: Path, seconds: float, *_state: int) -> OnnxFile:
         raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # it throws what it logs
-    with _explained(path):
+    options.log_severity_level = 4  # it raises what it logs
+    with explaining(path):
         session = onnxruntime.InferenceSession(
             str(path), options, providers=["CPUExecutionProvider"], enable_fallback=0
         )
-        inputs, outputs = (
-            tuple(map(Tensor.of, each)) for each in (session.get_inputs(), session.get_outputs())
-        )
+        inputs = tuple(map(Tensor.of, session.get_inputs()))
+        outputs = tuple(map(Tensor.of, session.get_outputs()))
         metadata = session.get_modelmeta().custom_metadata_map
     return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata)
 
 
 @contextmanager
-def _readable(path: Path, what: str) -> Iterator[None]:
+def reading(path: Path, problem: str) -> Iterator[None]:
     """Turn an error of reading into one line."""
     try:
         yield
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise NetworkError(f"{path}: {what}: {reason}") from error
+        raise NetworkError(f"{path}: {problem}: {reason}") from error
 
 
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def explaining(path: Path) -> Iterator[None]:
     """Turn an error of onnxruntime into one line that quotes it."""
     import onnxruntime
 
@@ -218,17 +218,17 @@ def _explained(path: Path) -> Iterator[None]:
         yield
     except MemoryError:
         raise
-    except Exception as error:  # onnxruntime's have no class of their own in common
+    except Exception as error:  # onnxruntime's errors have no common class
         if type(error).__name__ in ("InvalidProtobuf", "UnicodeDecodeError"):
             raise NetworkError(f"{path}: {_DAMAGED}") from error
-        said = visible(" ".join(_PREAMBLE.sub("", str(error)).split()))
-        quoted = said if len(said) <= QUOTED else f"{said[:QUOTED]}..."
+        message = visible(" ".join(_PREAMBLE.sub("", str(error)).split()))
+        quoted = message if len(message) <= QUOTED else f"{message[:QUOTED]}..."
         library = f"onnxruntime {onnxruntime.__version__}"
         raise NetworkError(f"{path}: {library} cannot run the network: {quoted}") from error
 
 
-# An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. What is no such
-# message is a ValueError.
+# An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. Any other file is a
+# ValueError.
 
 HOLDING: Final[Mapping[str, Mapping[int, str]]] = {
     "model": {7: "graph", 20: "training", 25: "function"},
@@ -241,29 +241,23 @@ HOLDING: Final[Mapping[str, Mapping[int, str]]] = {
     "sparse": {1: "tensor", 2: "tensor"},
     "tensor": {13: "entry"},
 }
-"""Messages that lead to tensors, and what their fields hold."""
+"""Messages that lead to tensors, and the messages in their fields."""
 
 
 def weight_files(model: memoryview) -> Iterator[str]:
-    """Yield the names of the files beside it that hold weights, wherever in a model they are used.
+    """Yield the names of the weight files of a model, which lie beside it.
 
-    That is by the graph, by nodes and their inner graphs, and by functions.
+    The graph, nodes and their inner graphs, and functions may name such files.
     """
     waiting = [("model", model)]
     while waiting:
         kind, message = waiting.pop()
         if kind == "entry":
-            key, value = ([*_all(message, number)][-1:] for number in (1, 2))
-            if key == [b"location"]:
-                yield from (bytes(name).decode(errors="replace") for name in value)
+            fields = [*protobuf_fields(message)]
+            if (1, b"location") in fields:
+                names = (value for number, value in fields if number == 2)
+                yield from (str(n, errors="replace") for n in names if isinstance(n, memoryview))
             continue
         for number, value in protobuf_fields(message):
             if (inner := HOLDING[kind].get(number)) and isinstance(value, memoryview):
                 waiting.append((inner, value))
-
-
-def _all(message: memoryview, number: int, *inner: int) -> Iterator[memoryview]:
-    """Yield the bytes of each field of a message that has this number, or of fields within it."""
-    for found, value in protobuf_fields(message):
-        if found == number and isinstance(value, memoryview):
-            yield from _all(value, *inner) if inner else (value,)

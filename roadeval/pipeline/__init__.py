@@ -1,1 +1,1 @@
-"""Stages and chains: pure functions on arrays. `paper` is what the paper has, `beyond` the rest."""
+"""Stages and chains: pure functions on arrays, of the paper in `paper`, all others in `beyond`."""

@@ -16,8 +16,8 @@ from roadeval.pipeline.stages import stages_of
 class Pipeline:
     """Stages in the order they run, and the settings of each.
 
-    ``chain`` names them as `roadeval.pipeline.stages.stages_of` finds them, which need not be the
-    names that they bear themselves; ``settings`` are by the latter.
+    ``chain`` has the names that `roadeval.pipeline.stages.stages_of` takes, which may differ from
+    the stages' own names; ``settings`` are by the stages' own names.
     """
 
     chain: tuple[str, ...]
@@ -32,8 +32,8 @@ class Pipeline:
         return [(stage, self.settings[stage.name]) for stage in self.stages()]
 
     def layers(self) -> tuple[LayerSpec, ...]:
-        """Return the layers that the stages will hand out, in order."""
-        return tuple(spec for stage, own in self._pairs() for spec in stage.specs(own))
+        """Return the layers of the stages' outputs, in order."""
+        return tuple(spec for stage, settings in self._pairs() for spec in stage.specs(settings))
 
     def masks(self) -> tuple[str, ...]:
         """Return the names of the stages that make a road mask, in order."""
@@ -42,8 +42,8 @@ class Pipeline:
     def without_filter(self) -> Pipeline:
         """Return the pipeline without its filters."""
         pairs = zip(self.chain, self.stages(), strict=True)
-        kept = {name: stage.name for name, stage in pairs if not stage.is_filter}
-        return Pipeline(tuple(kept), {own: self.settings[own] for own in kept.values()})
+        names = {name: stage.name for name, stage in pairs if not stage.is_filter}
+        return Pipeline(tuple(names), {name: self.settings[name] for name in names.values()})
 
     def learning(self) -> tuple[str, ...]:
         """Return the names of the stages that learn."""
@@ -52,57 +52,60 @@ class Pipeline:
     def relevant(self) -> dict[str, dict[str, Any]]:
         """Return the settings that the learnt parameters depend on, by stage.
 
-        Those of stages that learn, change the image, or are heard, except where they are
-        `inference_only` or `places`.
+        These are settings of stages that learn, change the image, or are heard, except those that
+        are `inference_only` or `places`.
         """
         heard = self.heard()
         return {
             stage.name: {
                 key: value
-                for key, value in asdict(own).items()
+                for key, value in asdict(settings).items()
                 if key not in (*stage.inference_only, *stage.places)
             }
-            for stage, own in self._pairs()
+            for stage, settings in self._pairs()
             if stage.fit is not None or not stage.yields_mask or stage in heard
         }
 
     def heard(self) -> tuple[Stage, ...]:
-        """Return the stages whose masks a later one learns from; none where no stage hears any."""
+        """Return the stages whose masks a later stage learns from."""
         pairs = self._pairs()
-        last = max((n for n, (s, own) in enumerate(pairs) if s.hears and s.hears(own)), default=0)
-        return tuple(stage for stage, _ in pairs[:last] if stage.yields_mask)
+        hearing = [n for n, (stage, own) in enumerate(pairs) if stage.hears and stage.hears(own)]
+        return tuple(stage for stage, _ in pairs[: max(hearing, default=0)] if stage.yields_mask)
 
     def resolved(self) -> Pipeline:
-        """Return the pipeline with settings stated that its stages find in files.
+        """Return the pipeline with the settings that its stages read from files.
 
         A `RoadevalError` if a file cannot be used.
         """
-        found = {stage.name: stage.resolve(own) for stage, own in self._pairs() if stage.resolve}
-        return replace(self, settings={**self.settings, **found})
+        read = {s.name: s.resolve(settings) for s, settings in self._pairs() if s.resolve}
+        return replace(self, settings={**self.settings, **read})
 
     def without_places(self) -> Pipeline:
-        """Return the pipeline without the settings that say where files lie."""
-        blank = {s.name: replace(own, **dict.fromkeys(s.places, "")) for s, own in self._pairs()}
+        """Return the pipeline without the settings that are paths of files."""
+        blank = {
+            stage.name: replace(settings, **dict.fromkeys(stage.places, ""))
+            for stage, settings in self._pairs()
+        }
         return replace(self, settings=blank)
 
     def about(self) -> dict[str, dict[str, Any]]:
-        """Return what results say of stages beside their settings, by stage."""
-        return {stage.name: dict(stage.about(own)) for stage, own in self._pairs() if stage.about}
+        """Return the stages' facts for results beside their settings, by stage."""
+        return {s.name: dict(s.about(settings)) for s, settings in self._pairs() if s.about}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the chain and its settings as plain data, in the shape of a TOML file."""
-        settings = {name: asdict(own) for name, own in self.settings.items()}
+        settings = {name: asdict(values) for name, values in self.settings.items()}
         return {"chain": list(self.chain), **settings}
 
     def bind(self, parameters: Mapping[str, Any]) -> Chain:
-        """Return the chain that runs with what the stages have learnt, by stage.
+        """Return the chain that runs with the parameters that each stage has learnt, by stage.
 
-        A `MisfitError` if that does not fit the settings.
+        A `MisfitError` if they do not fit the settings.
         """
         steps = []
-        for stage, own in self._pairs():
+        for stage, settings in self._pairs():
             learnt = parameters.get(stage.name)
-            steps.append(Step(stage, own, learnt, stage.bind(own, learnt)))
+            steps.append(Step(stage, settings, learnt, stage.bind(settings, learnt)))
         return Chain(tuple(steps))
 
 
@@ -125,10 +128,10 @@ class Chain:
     def run(
         self, view: View, shared: dict[Any, StageResult] | None = None
     ) -> Iterator[StageResult]:
-        """Yield what each stage makes of what is seen before the first, and how long it took.
+        """Yield the output of each stage, and how long it took; ``view`` is the first stage's.
 
-        A stage runs when its result is taken. ``shared`` holds what the chains of a frame have in
-        common: the first stage that makes a mask and has learnt nothing, as a network that is a
+        A stage runs when its result is taken. ``shared`` holds results that the chains of a frame
+        share: those of a first stage that makes a mask and learns nothing, as a network that is one
         variant and is tuned in another. It runs once.
         """
         shared, seen = {} if shared is None else shared, view
@@ -148,11 +151,11 @@ class Chain:
     def oracles(
         self, view: View, outputs: Sequence[Output], road: Truth, shadow: Truth | None
     ) -> Iterator[tuple[str, dict[str, Packed]]]:
-        """Yield what the chain makes of an image once one of its stages is replaced by the truth.
+        """Yield the masks of the chain with one of its stages replaced by the truth.
 
         ``view`` and ``outputs`` are the argument and the outputs of `run`, ``road`` and ``shadow``
-        the truths, ``(H, W)`` uint8 (0, 1, 255); without that of shadow no filter is replaced.
-        Yielded are the name of the stage that was replaced, and the masks of those after it.
+        the truths, ``(H, W)`` uint8 (0, 1, 255). Without the truth of shadow no filter is replaced.
+        Yielded are the name of the replaced stage, and the masks of the stages after it.
         """
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True), 1):
             truth = shadow if step.stage.is_filter else road

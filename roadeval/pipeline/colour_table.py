@@ -1,8 +1,8 @@
-"""A decision for every colour there is: 2^24 bits, in which a pixel's is looked up.
+"""A decision for every possible colour: a table of 2^24 bits, in which pixels are looked up.
 
-What depends on a pixel's three colours alone is a function on a cube of 256 levels a channel. Where
-it is a sum of products of one factor a channel, as of an RBF kernel, all colours of one red level
-are a product of matrices. Along a channel a factor changes slowly: polynomials through a few
+A decision that depends on a pixel's colour alone is a function on a cube of 256 levels per channel.
+If it is a sum of products of one factor per channel, as for an RBF kernel, all colours of one red
+level are a product of matrices. Along a channel a factor changes slowly: polynomials through a few
 Chebyshev nodes interpolate it at every level, and their error is measured.
 """
 
@@ -19,15 +19,15 @@ from roadeval.data.arrays import Flags, Floats, Plane, Words
 
 Decide = Callable[[Plane], Flags]
 Margins = tuple[Callable[[int], Floats], float]
-"""From a red level 0..255 to ``(256, 256)`` float64 margins by green and blue level; no margin is
-further than the number from the true one."""
+"""A function from a red level 0..255 to ``(256, 256)`` float64 margins by green and blue level; and
+the greatest distance of a margin from the true one."""
 
 LEVELS: Final = np.arange(256.0)
 EPS: Final = float(np.finfo(np.float64).eps)
 ENOUGH: Final = 1e-6
-"""Margins as near as this leave some twenty of all colours undecided."""
+"""An error of margins that leaves some twenty of all colours undecided."""
 FEW: Final = 1 << 16
-"""Undecided colours that are decided one by one, at most."""
+"""Greatest number of undecided colours that are decided one by one."""
 _NODES: Final = (16, 24, 32, 48, 64, 96, 128, 256)
 
 
@@ -44,15 +44,15 @@ def sums_of_products(
     """Return the margins ``sum_i weights[i] f_i(0, R) f_i(1, G) f_i(2, B) + offset``.
 
     ``weights`` are ``(m,)``; ``factor(channel, levels)`` returns the ``(n, m)`` factors f_i of that
-    channel, each in 0..1, at ``(n,)`` levels in 0..255, whole or not. ``offset`` is added to every
-    sum; ``rounding`` is how far a factor may be off as it is computed.
+    channel, each in 0..1, at ``(n,)`` levels in 0..255, which need not be integers. ``offset`` is
+    added to every sum; ``rounding`` bounds the rounding error of a factor.
     """
     total = float(np.abs(weights).sum())
     exact = factor(1, LEVELS), factor(2, LEVELS)
-    for count in _NODES:  # the fewest whose error, twice, is small enough
-        nodes, matrix = _chebyshev(count) if count < 256 else (LEVELS, np.eye(256))
+    for count in _NODES:  # the fewest nodes with a small enough error
+        nodes, matrix = interpolation(count) if count < 256 else (LEVELS, np.eye(256))
         green, blue = factor(1, nodes), factor(2, nodes)
-        swell = float(np.abs(matrix).sum(axis=1).max())  # the most by which an error can grow
+        swell = float(np.abs(matrix).sum(axis=1).max())  # the greatest growth of an error
         seen = max(np.abs(exact[0] - matrix @ green).max(), np.abs(exact[1] - matrix @ blue).max())
         gap = float(seen) + swell * (count * EPS + 2 * rounding)
         if 2 * gap <= ENOUGH / total:
@@ -65,14 +65,14 @@ def sums_of_products(
         values += offset
         return values
 
-    # What the factors are off, and one rounding for each addition of the three matrix products.
+    # The error of the factors, and one rounding for each addition of the three matrix products.
     factors = (1 + rounding) * (1 + gap) ** 2 - 1
     additions = swell**2 * (len(weights) + 2 * count + 4) * EPS
     return margins, total * (factors + additions) + abs(offset) * EPS
 
 
-def _chebyshev(count: int) -> tuple[Floats, Floats]:
-    """Return ``(count,)`` Chebyshev nodes in 0..255; ``(256, count)`` from there to each level."""
+def interpolation(count: int) -> tuple[Floats, Floats]:
+    """Return ``(count,)`` Chebyshev nodes in 0..255; ``(256, count)`` weights for each level."""
     nodes = chebpts1(count)
     at_nodes, at_levels = (chebvander(x, count - 1) for x in (nodes, LEVELS / 127.5 - 1.0))
     matrix = np.linalg.solve(at_nodes.T, at_levels.T).T
@@ -82,10 +82,10 @@ def _chebyshev(count: int) -> tuple[Floats, Floats]:
 def table_of(margins: Margins, decide: Decide) -> Words:
     """Return which colours have a positive margin, for `roadeval.kernels.plain.look_up_colours`.
 
-    Each is decided as exactly as by ``decide``: the margins decide where they are further from 0
-    than their error bound, and ``decide`` the colours that are left, ``(n, 3)`` uint8 to ``(n,)``
-    bool: some twenty as a rule. Where more than `FEW` are left, as of a machine that has learnt
-    nothing and whose margin is 0 everywhere, none of them has a positive one.
+    Each decision is exactly that of ``decide``, which takes colours, ``(n, 3)`` uint8, and returns
+    ``(n,)`` bool: a margin decides if it is further from 0 than its error bound, and ``decide`` the
+    other colours, as a rule some twenty. If there are more than `FEW`, as for a machine that has
+    learnt nothing and whose margin is 0 everywhere, none of them has a positive margin.
 
     A word holds a cube of 4x4x4 colours, so a block of four red levels fills 64 x 64 words::
 
@@ -97,7 +97,7 @@ def table_of(margins: Margins, decide: Decide) -> Words:
         transposed                (G7..G2, B7..B2, G1 G0, B1 B0) = (64, 64, 4, 4)
         four of them, the block   (G7..G2, B7..B2, R1 R0, G1 G0, B1 B0): word, then bit
 
-    B1 B0 stay together, so that four colours are moved at once, as one number.
+    B1 B0 stay together, so that four colours move at once, as one number.
     """
     words = np.empty((2, 64, 64 * 64), np.uint64)
     block = np.empty((2, 64, 64, 4, 4), np.uint32)

@@ -1,4 +1,4 @@
-"""The reference patch: a trapezoid in front of the vehicle that is taken to be road."""
+"""The reference patch: a trapezoid in front of the vehicle that is taken for road."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ReferencePatch:
     top: Share = 0.75
     """First row, from the image's upper edge."""
     bottom: Share = 0.95
-    """Last row; it stays clear of the vehicle's own bonnet."""
+    """Last row, above the vehicle's own bonnet."""
     top_width: Share = 0.2
     """Width of the upper edge."""
     bottom_width: Share = 0.4
@@ -36,7 +36,7 @@ class ReferencePatch:
 def patch_mask(height: int, width: int, patch: ReferencePatch) -> Mask:
     """Rasterise the patch as an ``(H, W)`` uint8 mask, read-only and shared between calls.
 
-    A pixel belongs to it when its centre does; each row holds at least the middle.
+    A pixel belongs to it if its centre does; each row holds at least the middle.
     """
     import numpy as np
 

@@ -1,8 +1,8 @@
-"""What a stage must provide.
+"""The interface of a stage.
 
 A stage is one file in `roadeval.pipeline.paper` or `roadeval.pipeline.beyond` that defines
-``STAGE``, a `Stage`. It is found there, and a configuration names it in its ``chain``. A minimal
-one is a filter without parameters to learn::
+``STAGE``, a `Stage`. A configuration names it in its ``chain``. A minimal one is a filter without
+parameters to learn::
 
     DARKER = LayerSpec("darker", LayerKind.RGB, "Half as bright")
 
@@ -55,42 +55,42 @@ class StageError(RoadevalError):
 
 
 class AbsentError(StageError):
-    """A frame of which another method says nothing: the variant alone leaves it out."""
+    """A frame without another method's mask: only the variant that needs it leaves it out."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a stage sees of a frame: views of one image share its arrays."""
+    """The input of a stage; views of one image share its arrays."""
 
     original: Rgb
     """``(H, W, 3)`` uint8 RGB: the image as logged."""
     image: Rgb
-    """The same after the filters that ran before this stage, C-contiguous."""
+    """The image after the filters that ran before this stage, C-contiguous."""
     planes: Planes = field(repr=False)
     """Red, green and blue of ``image``, ``(H, W)`` uint8 each."""
     opinion: Output | None = None
     """The output of the previous stage that made a road mask, if there was one."""
     moment: Moment | None = None
-    """When the image was taken; None for one that belongs to no drive."""
-    given: Mapping[str, Output] = field(default_factory=dict)
-    """What other methods' masks say of the frame, by the names of their variants."""
+    """When the image was taken; None if it belongs to no drive."""
+    external: Mapping[str, Output] = field(default_factory=dict)
+    """Masks of other methods on the frame, by the names of their variants."""
 
     @classmethod
     def of(
-        cls, image: Rgb, moment: Moment | None = None, given: Mapping[str, Output] | None = None
+        cls, image: Rgb, moment: Moment | None = None, external: Mapping[str, Output] | None = None
     ) -> View:
-        """Return what the first stage sees of an ``(H, W, 3)`` uint8 RGB image."""
+        """Return the view of the first stage of an ``(H, W, 3)`` uint8 RGB image."""
         image = np.ascontiguousarray(image)
-        return cls(image, image, split(image), moment=moment, given=given or {})
+        return cls(image, image, split(image), moment=moment, external=external or {})
 
     @classmethod
     def of_frame(cls, frame: Frame) -> View:
-        """Return what the first stage sees of a frame."""
-        given = {
+        """Return the view of the first stage of a frame."""
+        external = {
             name: Output(mask=Packed.of(mask), probability=frame.probabilities.get(name))
             for name, mask in frame.external.items()
         }
-        return cls.of(frame.image, frame.moment, given)
+        return cls.of(frame.image, frame.moment, external)
 
     @property
     def mask(self) -> Packed | None:
@@ -98,7 +98,7 @@ class View:
         return None if self.opinion is None else self.opinion.mask
 
     def after(self, output: Output) -> View:
-        """Return what the next stage sees."""
+        """Return the view of the next stage."""
         image = self.image if output.image is None else output.image
         planes = self.planes if image is self.image else split(image)
         opinion = self.opinion if output.mask is None else output
@@ -110,60 +110,57 @@ class Stage:
     """One step of a pipeline."""
 
     name: str
-    """In a chain, a configuration, tables and recordings; also that of the layer of its mask."""
+    """Its name in a chain, a configuration, tables and recordings, and that of its mask's layer."""
     title: str
     """A few words for a person, as ``Phase 1: colour similarity``."""
     settings: type[Any]
     """The type of its settings, a frozen dataclass; every field has a default."""
     bind: Callable[[Any, Any], Callable[[View], Output]]
-    """``bind(settings, parameters)`` returns the pure function from `View` to `Output`. What
-    depends on settings and parameters alone (tables, structuring elements) is computed here,
-    once. A `MisfitError` if the parameters do not fit the settings."""
+    """``bind(settings, parameters)`` returns the pure function from `View` to `Output`. It also
+    computes, once, all that depends on settings and parameters alone (tables, structuring
+    elements). A `MisfitError` if the parameters do not fit the settings."""
     layers: tuple[LayerSpec, ...] | Callable[[Any], tuple[LayerSpec, ...]]
-    """The layers that it will hand out, in order; or a function that returns them for its settings.
-    """
+    """The layers of its output, in order; or a function that returns them for its settings."""
     fit: Callable[[TrainingSet, Any], Any] | None = None
     """``fit(training_set, settings)`` learns the parameters; None if there is nothing to learn."""
     adapt: Callable[[Any, TrainingSet, Any], Any] | None = None
     """``adapt(parameters, training_set, settings)`` learns further from a drive's own frames, on
-    top of what other drives have taught; None if that stays as it is."""
+    top of parameters from other drives; None if those stay unchanged."""
     parameters: type[Any] | None = None
     """The type of the parameters, for reading model files: a frozen dataclass of floats and arrays;
     None if there are none."""
     is_filter: bool = False
     """Whether it only changes the image, and is left out of the ``unfiltered`` variant, which shows
-    what it contributes."""
+    its effect."""
     preprocesses: bool = False
     """Whether it only changes the image, in every variant."""
     oracle: Callable[[Any, Any, View, Truth], Output] | None = None
-    """``oracle(settings, parameters, view, truth)`` is the stage as it would be if it were perfect:
-    it knows the truth, of shadow for a filter, else of the road. None where a perfect one would be
-    of no interest."""
+    """``oracle(settings, parameters, view, truth)`` is the perfect stage: it knows the truth, of
+    shadow for a filter, else of the road. None if a perfect one is of no interest."""
     inference_only: tuple[str, ...] = ()
     """Settings that the learnt parameters do not depend on: a model may be used with other values
-    than it was trained with."""
+    than those it was trained with."""
     hears: Callable[[Any], bool] | None = None
-    """``hears(settings)`` tells whether it learns from what the stage before says of a frame, which
-    must learn nothing itself: of frames that taught it, that would say too much. None: never."""
+    """``hears(settings)`` tells whether it learns from the output of the stage before. That stage
+    must not be trained: its output on its training frames would be over-confident. None: never."""
     resolve: Callable[[Any], Any] | None = None
-    """``resolve(settings)`` returns the settings with all stated that they leave to a file, its
-    digest included; a `RoadevalError` if the file cannot be used. None where they name none."""
+    """``resolve(settings)`` returns the settings with all values that their file holds, and its
+    digest; a `RoadevalError` if the file cannot be used. None if they name no file."""
     places: tuple[str, ...] = ()
-    """Settings that say where a file lies, and decide nothing once its digest is stated."""
+    """Settings that are paths of files, and change nothing once the file's digest is stated."""
     about: Callable[[Any], Mapping[str, Any]] | None = None
-    """``about(settings)`` returns what results say of the stage beside its settings, as plain data
-    by name."""
+    """``about(settings)`` returns facts for results beside its settings, as plain data by name."""
     code: str | None = None
-    """SHA-256 of the file that defines a stage from outside the package, empty without a file;
-    roadeval's own are known by its version."""
+    """SHA-256 of the file that defines a stage from outside the package, empty without a file; None
+    for roadeval's own stages, which its version identifies."""
 
     def specs(self, settings: Any) -> tuple[LayerSpec, ...]:
-        """Return the layers that it will hand out with these settings, in order."""
+        """Return the layers of its output with these settings, in order."""
         return self.layers(settings) if callable(self.layers) else self.layers
 
     @property
     def yields_mask(self) -> bool:
-        """Whether it hands out a road mask; otherwise an image for the stages after it."""
+        """Whether its output is a road mask; otherwise it is an image for the stages after it."""
         return not (self.is_filter or self.preprocesses)
 
 
@@ -187,32 +184,32 @@ def perfect_mask(_settings: Any, _parameters: Any, _view: View, truth: Truth) ->
 def split(image: Rgb) -> Planes:
     """Return red, green and blue of an ``(H, W, 3)`` uint8 image, ``(H, W)`` uint8 each."""
     red, green, blue = channels = [np.empty(image.shape[:2], np.uint8) for _ in range(3)]
-    # OpenCV takes three times as long where it allocates the arrays itself.
+    # OpenCV takes three times as long if it allocates the arrays itself.
     cv2.split(image, channels)
     return red, green, blue
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingSet:
-    """Labelled pixels of some frames, as one variant's filters left them."""
+    """Labelled pixels of some frames, after one variant's filters."""
 
     images: tuple[Rgb, ...]
     """The training frames, each ``(H, W, 3)`` uint8 RGB."""
     frame: Places
     row: Places
     column: Places
-    """``(n,)`` integers: where each sampled pixel lies."""
+    """``(n,)`` integers each: the place of each sampled pixel."""
     road: Flags
     """``(n,)`` bool: its label."""
     seed: int = 0
-    """For whatever a fit draws at random."""
+    """Seed of everything that a fit draws at random."""
     share: float | None = None
-    """Of road among the labelled pixels of the frames, from which as many pixels of road as of the
-    rest are sampled; None where the labels are a guess, whose share is not to be trusted."""
+    """Share of road among the labelled pixels of the frames; the sample has as many pixels of road
+    as of the rest. None if the labels are a guess, whose share cannot be trusted."""
     truths: tuple[Truth, ...] = ()
-    """Of the frames, whole: for what few pixels do not tell."""
+    """The truth of every pixel of the frames, for fits that need more than the sample."""
     opinions: tuple[Output | None, ...] = ()
-    """What the stage before says of each frame, if it makes a mask; empty where none is asked."""
+    """The output of the stage before for each frame, if it makes a mask; empty if none is heard."""
 
     def colours(self) -> npt.NDArray[np.uint8]:
         """Return the colours of the sampled pixels, ``(n, 3)`` uint8 RGB."""
@@ -224,39 +221,38 @@ class TrainingSet:
 
 
 GREATEST: Final = 1e15
-"""No learnt number is larger, so that sums of products of two and a colour stay finite, in
-float32 too."""
+"""Greatest learnt number: sums of products of two such numbers and a colour stay finite, in float32
+too."""
 
 
 def check_arrays(
     parameters: Any, dtype: type[np.number[Any]], **shapes: tuple[int | str, ...]
 ) -> None:
-    """Check what the functions of a stage assume about its parameters.
+    """Check the shapes, types and numbers of a stage's parameters.
 
-    A `ValueError` if a field has another shape or type, or holds a number that is not finite or
-    beyond `GREATEST`; a sentence that names the field. ``parameters`` is a dataclass, ``dtype`` the
-    type of its arrays; single numbers may be of any real type. ``shapes`` has the shape of each
-    field: a letter stands for a length of one or more, the same wherever it occurs; ``()`` is a
-    single number.
+    A `ValueError` that names the field if one has another shape or type, or holds a number that is
+    not finite or beyond `GREATEST`. ``parameters`` is a dataclass, ``dtype`` the type of its
+    arrays; single numbers may be of any real type. ``shapes`` has the shape of each field: a letter
+    stands for a length of one or more, the same wherever it occurs; ``()`` is a single number.
     """
     lengths: dict[int | str, int] = {}
     for name, shape in shapes.items():
         array = np.asarray(getattr(parameters, name))
         lengths = dict(zip(shape, array.shape, strict=False)) | lengths  # the first one holds
-        wanted = (each if isinstance(each, int) else lengths.get(each) for each in shape)
-        if array.shape != (*wanted,) or not array.size:
-            raise ValueError(f"{name} has the shape {_text(array.shape)} instead of {_text(shape)}")
+        expected = [side if isinstance(side, int) else lengths.get(side) for side in shape]
+        if [*array.shape] != expected or not array.size:
+            actual, there = (
+                f"({', '.join(map(str, sides))}{',' * (len(sides) == 1)})"
+                for sides in (array.shape, shape)
+            )
+            raise ValueError(f"{name} has the shape {actual} instead of {there}")
         if array.dtype != dtype if shape else array.dtype.kind not in "iuf":
             raise ValueError(f"{name} is of type {array.dtype} instead of {np.dtype(dtype)}")
         check_range(name, array, -GREATEST, GREATEST)
 
 
 def check_range(name: str, values: npt.ArrayLike, least: float, greatest: float) -> None:
-    """Raise a ValueError if a number lies outside a range, both ends included, or is none."""
-    array = np.asarray(values, np.float64)  # no smaller type may have to hold the ends
+    """Raise a ValueError if a number is NaN or lies outside a range, which includes both ends."""
+    array = np.asarray(values, np.float64)  # a smaller type could not hold the ends
     if not ((array >= least) & (array <= greatest)).all():
         raise ValueError(f"{name} holds a number outside {least:g} to {greatest:g}")
-
-
-def _text(shape: tuple[int | str, ...]) -> str:
-    return f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"

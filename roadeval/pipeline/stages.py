@@ -1,6 +1,6 @@
-"""Every stage that a chain may name: roadeval's own, installed ones, and those of a module.
+"""Every stage that a chain may name: roadeval's own, those of other packages and of modules.
 
-Code of somebody else runs only where its name stands in a ``chain``: as an entry point of the group
+Code from outside runs only if a ``chain`` names it: as an entry point of the group
 ``roadeval.stages``, or as ``module:name``, which Python must be able to import.
 """
 
@@ -24,22 +24,20 @@ from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
-from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.discovery import by_name, collect
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.text import visible
 
 GROUP: Final = "roadeval.stages"
 """The group of entry points by which a package adds stages."""
 
-STAGES: Final[Mapping[str, Stage]] = by_name(
-    (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
-)
-"""The stages of this package, found by their folder."""
+STAGES: Final[Mapping[str, Stage]] = by_name((*collect(beyond, "STAGE"), *collect(paper, "STAGE")))
+"""The stages of this package, one per file of their folders."""
 
 
 PACKAGE: Final = Path(__file__).parents[1]
 """The folder of roadeval itself."""
-TAKEN: Final = ("image", "moment", "settings")
+ARGUMENTS: Final = ("image", "moment", "settings")
 """The names of the arguments that a function may have."""
 
 
@@ -47,54 +45,52 @@ class UnknownStageError(RoadevalError, LookupError):
     """A name in a chain that is no stage: which, and why."""
 
 
-def names() -> list[str]:
-    """List the names that a chain may hold, besides ``module:name``."""
-    return [*STAGES, *sorted(_added() - STAGES.keys())]
-
-
 @cache
-def _added() -> frozenset[str]:
-    """Return the names of the stages that packages add: to look through all packages takes long."""
-    return frozenset(each.name for each in entry_points(group=GROUP))
+def names() -> tuple[str, ...]:
+    """Return the names that a chain may hold, besides ``module:name``.
+
+    They are looked up once: it takes long to search all installed packages.
+    """
+    return (*STAGES, *sorted({point.name for point in entry_points(group=GROUP)} - STAGES.keys()))
 
 
 def stages_of(chain: Iterable[str]) -> tuple[Stage, ...]:
     """Return the stages that a chain names, in order; an `UnknownStageError` if one is none."""
-    return tuple(STAGES.get(name) or _somebodys(name) for name in chain)
+    return tuple(STAGES.get(name) or import_stage(name) for name in chain)
 
 
 @cache
-def _somebodys(name: str) -> Stage:
-    """Import a stage that is not this package's own; its results say which file defines it."""
+def import_stage(name: str) -> Stage:
+    """Import a stage from outside this package; its results say which file defines it."""
     try:
-        found = _imported(name)
-        module = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
-        if callable(found) and not isinstance(found, type):
-            found = stage_of_function(re.split("[:.]", name)[-1], found)
-        if not isinstance(found, Stage):
-            raise TypeError(f"it is {type(found).__name__}, and neither a Stage nor a function")
-        _check(found)
-        found = guarded(found)
+        stage = _import_object(name)
+        module = inspect.getmodule(stage.bind if isinstance(stage, Stage) else stage)
+        if callable(stage) and not isinstance(stage, type):
+            stage = stage_of_function(re.split("[:.]", name)[-1], stage)
+        if not isinstance(stage, Stage):
+            raise TypeError(f"it is {type(stage).__name__}, and neither a Stage nor a function")
+        check_stage(stage)
         if (file := getattr(module, "__file__", None)) is None:
-            return replace(found, code="")
+            return guard(replace(stage, code=""))
         origin = {"stage": name, "file": Path(file).name, "sha256": sha256_of(Path(file))}
-        own = found.about
+        facts = stage.about
 
         def about(settings: Any) -> Mapping[str, Any]:
-            return {**origin, **(own(settings) if own else {})}
+            return {**origin, **(facts(settings) if facts else {})}
 
-        return replace(found, about=about, code=origin["sha256"])
+        return guard(replace(stage, about=about, code=origin["sha256"]))
     except UnknownStageError:
         raise
-    except Exception as error:  # whatever somebody's module raises
-        raise UnknownStageError(f"stage {name!r} cannot be used: {_said(error)}") from error
+    except Exception as error:  # a module from outside may raise anything
+        raise UnknownStageError(f"stage {name!r} cannot be used: {_one_line(error)}") from error
 
 
-def _said(error: Exception) -> str:
+def _one_line(error: Exception) -> str:
     return visible(" ".join(f"{type(error).__name__}: {error}".split()))
 
 
-def _imported(name: str) -> Any:
+def _import_object(name: str) -> Any:
+    """Import the object of an entry point or of ``module:name``."""
     module, _, attributes = name.partition(":")
     if not attributes:
         points = [*entry_points(group=GROUP, name=name)]
@@ -110,11 +106,11 @@ def _imported(name: str) -> Any:
         ) from error
 
 
-def _check(stage: Stage) -> None:
-    """Raise a ValueError where a stage's names cannot stand in results."""
-    for each in (stage.name, *(spec.name for spec in stage.specs(stage.settings()))):
-        if not is_plain(each):
-            raise ValueError(f"its name {each!r} must be of letters, digits, '-' and '_' alone")
+def check_stage(stage: Stage) -> None:
+    """Raise a ValueError if a stage's names cannot stand in results, or its model in a file."""
+    for name in (stage.name, *(spec.name for spec in stage.specs(stage.settings()))):
+        if not is_plain(name):
+            raise ValueError(f"its name {name!r} must be of letters, digits, '-' and '_' alone")
     if stage.name in STAGES:
         raise ValueError(f"its name {stage.name!r} is that of a stage of roadeval")
     if stage.fit is not None and stage.parameters is None:
@@ -129,16 +125,16 @@ class NoSettings:
 def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     """Return the stage of a function from an image to a road mask.
 
-    A `TypeError` if it has other arguments. The function's arguments are given by their names:
-    ``image``, ``(H, W, 3)`` uint8 RGB; ``moment``, a `roadeval.data.Moment`, or None for an image
-    by itself; and ``settings``, whose default is an instance of a dataclass. It returns ``(H, W)``
-    bool or whole numbers, nonzero where road is; or floats from 0 to 1, how probable road is, whose
-    mask is what is above one half.
+    A `TypeError` if it has other arguments. The function's arguments are passed by name: ``image``,
+    ``(H, W, 3)`` uint8 RGB; ``moment``, a `roadeval.data.Moment`, or None for an image by itself;
+    and ``settings``, whose default is an instance of a dataclass. It returns ``(H, W)`` bool or
+    integers, nonzero for road; or floats from 0 to 1, the probability of road, which is road above
+    one half.
     """
     arguments = inspect.signature(function).parameters
     for argument, about in arguments.items():
-        if argument not in TAKEN and about.default is about.empty:
-            raise TypeError(f"its argument {argument} is none of {', '.join(TAKEN)}")
+        if argument not in ARGUMENTS and about.default is about.empty:
+            raise TypeError(f"its argument {argument} is none of {', '.join(ARGUMENTS)}")
     if "image" not in arguments:
         raise TypeError("it has no argument image")
     default = arguments["settings"].default if "settings" in arguments else NoSettings()
@@ -149,37 +145,36 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
 
     @per_view
     def bind(settings: Any, _learnt: None, view: View) -> Output:
-        given = {"image": view.image, "moment": view.moment, "settings": settings}
-        return _output(function(**{key: given[key] for key in given if key in arguments}), spec)
+        values = {"image": view.image, "moment": view.moment, "settings": settings}
+        array = np.asarray(function(**{key: values[key] for key in values if key in arguments}))
+        codes = None
+        if array.ndim != 2:
+            raise ValueError(
+                f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask"
+            )
+        if array.dtype.kind == "f":
+            if not ((array >= 0) & (array <= 1)).all():
+                raise ValueError("it returned floats that are no probabilities, from 0 to 1")
+            codes = np.rint(array * CERTAIN).astype(np.uint16)
+            array = codes > round(CERTAIN / 2)
+        mask = Packed.of(array != 0)
+        return Output((Layer(spec, mask),), mask=mask, probability=codes)
 
     return Stage(name, spec.title, type(default), bind, (spec,))
 
 
-def _output(found: Any, spec: LayerSpec) -> Output:
-    array, codes = np.asarray(found), None
-    if array.ndim != 2:
-        raise ValueError(f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask")
-    if array.dtype.kind == "f":
-        if not ((array >= 0) & (array <= 1)).all():
-            raise ValueError("it returned floats that are no probabilities, from 0 to 1")
-        codes = np.rint(array * CERTAIN).astype(np.uint16)
-        array = codes > round(CERTAIN / 2)
-    mask = Packed.of(array != 0)
-    return Output((Layer(spec, mask),), mask=mask, probability=codes)
+def guard(stage: Stage) -> Stage:
+    """Return a stage whose errors are `StageError`, and which raises one for a wrong output."""
 
-
-def guarded(stage: Stage) -> Stage:
-    """Return a stage whose every error is a `StageError`, and so is an output that cannot be."""
-
-    def named(what: str, work: Callable[..., Any]) -> Callable[..., Any]:
+    def named(problem: str, work: Callable[..., Any]) -> Callable[..., Any]:
         def run(*arguments: Any) -> Any:
             try:
                 return work(*arguments)
             except (RoadevalError, MemoryError):
                 raise
-            except Exception as error:  # whatever somebody's code raises
-                where = _place(error)
-                raise StageError(f"stage {stage.name} {what}: {_said(error)}{where}") from error
+            except Exception as error:  # code from outside may raise anything
+                message = f"{_one_line(error)}{_place(error)}"
+                raise StageError(f"stage {stage.name} {problem}: {message}") from error
 
         return run
 
@@ -188,7 +183,7 @@ def guarded(stage: Stage) -> Stage:
 
         def checked(view: View) -> Output:
             output = run(view)
-            _check_output(output, view, stage, specs)
+            check_output(output, view, stage, specs)
             return output
 
         return named("failed", checked)
@@ -198,16 +193,16 @@ def guarded(stage: Stage) -> Stage:
 
 
 def _place(error: Exception) -> str:
-    """Return where in somebody's file an error arose, as `` (mine.py:12)``; else nothing."""
-    frames = traceback.extract_tb(error.__traceback__)
-    others = [each for each in frames if PACKAGE not in Path(each.filename).parents]
-    own = [each for each in others if each.filename == others[0].filename][-1:]
-    return "".join(f" ({Path(each.filename).name}:{each.lineno})" for each in own)
+    """Return file and line of an error in code from outside, as `` (mine.py:12)``; else nothing."""
+    lines = traceback.extract_tb(error.__traceback__)
+    outside = [line for line in lines if PACKAGE not in Path(line.filename).parents]
+    last = [line for line in outside if line.filename == outside[0].filename][-1:]
+    return "".join(f" ({Path(line.filename).name}:{line.lineno})" for line in last)
 
 
-Held = tuple[int, tuple[type[np.generic], ...]]
-"""Dimensions of an array, and the types of which one must be its own."""
-KINDS: Final[Mapping[LayerKind, Held]] = {
+ArrayKind = tuple[int, tuple[type[np.generic], ...]]
+"""Dimensions of an array, and the types that it may have."""
+KINDS: Final[Mapping[LayerKind, ArrayKind]] = {
     LayerKind.MASK: (2, (np.bool_, np.integer)),
     LayerKind.LABELS: (2, (np.uint8,)),
     LayerKind.RGB: (3, (np.uint8,)),
@@ -216,8 +211,8 @@ KINDS: Final[Mapping[LayerKind, Held]] = {
 """Dimensions and types of the arrays that a recording can hold, by the kind of layer."""
 
 
-def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
-    """Raise an error where an output is none, or an array of another size or type than it must."""
+def check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
+    """Raise an error if this is no output, or one of its arrays has a wrong size or type."""
     if not isinstance(output, Output):
         raise TypeError(f"it returned {type(output).__name__} and no Output")
     size = view.image.shape[:2]
@@ -227,17 +222,17 @@ def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSp
         raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
     if wrong := [layer.spec.name for layer in output.layers if layer.spec not in specs]:
         raise ValueError(f"it handed out a layer {wrong[0]!r} that it does not announce")
-    arrays: list[tuple[str, Any, Held]] = [
+    arrays: list[tuple[str, Any, ArrayKind]] = [
         ("image", output.image, KINDS[LayerKind.RGB]),
         ("probability", output.probability, (2, (np.uint16,))),
         *((f"layer {a.spec.name!r}", a.array, KINDS[a.spec.kind]) for a in output.layers),
     ]
-    for what, array, (dimensions, types) in arrays:
+    for name, array, (dimensions, types) in arrays:
         if array is None:
             continue
         shape = view.image.shape[:dimensions]
-        if array.shape != shape or not any(np.issubdtype(array.dtype, each) for each in types):
-            wanted = " or ".join(each.__name__ for each in types)
+        if array.shape != shape or not any(np.issubdtype(array.dtype, kind) for kind in types):
+            kinds = " or ".join(kind.__name__ for kind in types)
             raise ValueError(
-                f"its {what} is {array.dtype} {array.shape}: it must be {wanted} {shape}"
+                f"its {name} is {array.dtype} {array.shape}: it must be {kinds} {shape}"
             )

@@ -43,7 +43,7 @@ from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import indexed_messages
-from roadeval.runtime.files import NewFile, own_name, remove, writing
+from roadeval.runtime.files import NewFile, partial_name, remove, writing
 from roadeval.runtime.threads import in_thread
 
 
@@ -519,7 +519,7 @@ class Recorder:
             limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
             if limit != resource.RLIM_INFINITY and self._size() >= limit:
                 return _failure(errno.EFBIG)
-        probe = own_name(self.partial)
+        probe = partial_name(self.partial)
         try:
             probe.write_bytes(b"\0")
         except OSError as error:

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison.compare import (
-    Change,
     ComparedResult,
     Comparison,
     DriveChange,
+    MaskChange,
     RegionChange,
 )
 from roadeval.evaluation.comparison.conditions import Judgement
@@ -37,7 +37,7 @@ from roadeval.results import comparison as sentences
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
-Row = Change | MovedFrame | RegionChange | DriveChange
+Row = MaskChange | MovedFrame | RegionChange | DriveChange
 """A fact on a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
 """The function that makes a row's cell in each column, by the columns' titles."""
@@ -114,7 +114,8 @@ def overview(
         ("Not judged", None, "warning"),
         ("Limits kept", False, "plain"),
     ):
-        if lines := [sentences.judged(limit) for limit in judgements if limit.holds is kind]:
+        limits = [limit for limit in judgements if limit.holds is kind]
+        if lines := [sentences.describe_judgement(limit) for limit in limits]:
             yield BulletList(title, lines, tone)
     yield Text(sentences.verdict(comparison), "verdict")
     yield from (Text(line) for line in sentences.changed_settings(comparison, most))
@@ -162,13 +163,15 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
         yield Text(legend, "note")
 
 
-def _changed(comparison: Comparison) -> list[Change]:
+def _changed(comparison: Comparison) -> list[MaskChange]:
     """Return the changes to show, without the variants of which no stage changed."""
     names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
     return [row for row in comparison.changes if (row.result, row.variant) in names]
 
 
-def _by(rows: Sequence[Change], key: Callable[[Change], str]) -> list[tuple[str, list[Change]]]:
+def _by(
+    rows: Sequence[MaskChange], key: Callable[[MaskChange], str]
+) -> list[tuple[str, list[MaskChange]]]:
     return [(name, [*group]) for name, group in groupby(rows, key)]
 
 

@@ -18,11 +18,12 @@ from roadeval.evaluation.metres import band_name
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
-from roadeval.evaluation.tables import grouped, only, values_of
+from roadeval.evaluation.tables import group_rows, only, values_of
 from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
 from roadeval.results.tables import read_table
+from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,8 +57,8 @@ class NotableFrame:
 
     @property
     def error(self) -> float:
-        """The ERR of the first variant, or its first sign of doubt; -1 if none is defined."""
-        rates = next(iter(self.rates.values()), {})
+        """The ERR of the focus, or its first sign of doubt; -1 if none is defined."""
+        rates = self.rates.get(focus_of(self.rates) or "", {})
         return next((rates[by] for by in (TESTED, *SIGNS) if defined(rates.get(by))), -1.0)
 
 
@@ -155,7 +156,7 @@ class Findings:
     def heatmaps(self) -> Mapping[str, Floats]:
         """Shares of FP and FN, ``(2, rows, columns)`` by variant; NaN where never labelled."""
         maps = {}
-        for (name,), cells in grouped(self.table("heat"), ["variant"]):
+        for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))
             maps[name] = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
             maps[name][:, rows, columns] = cells[["FP", "FN"]].div(cells["labelled"], axis=0).T

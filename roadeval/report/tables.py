@@ -13,7 +13,7 @@ from roadeval.report.blocks import Cell, Table
 from roadeval.report.captions import caption
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
-from roadeval.results.sentences import marked_interval, overconfident
+from roadeval.results.sentences import describe_overconfidence, marked_interval
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != TESTED)
 """The rates in short tables beside ERR."""
@@ -161,7 +161,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
         ["variant", "stage", "AP", "MaxF", "threshold", "ECE", "F1 as it is"],
         rows,
         text_columns=(0, 1),
-        caption=" ".join((caption("thresholds"), *overconfident(curves))),
+        caption=" ".join((caption("thresholds"), *describe_overconfidence(curves))),
         small=True,
     )
 

@@ -9,15 +9,16 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from roadeval.data.words import listing, percent, plain_points, setting
-from roadeval.evaluation.comparison.compare import FALSE, Change, Comparison
+from roadeval.evaluation.comparison.compare import FALSE, Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
-from roadeval.results.sentences import is_significant, sentence
+from roadeval.results.sentences import is_significant
+from roadeval.results.verdict import describe_change
 from roadeval.runtime.text import visible
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
 NAMED: Final = 5
-"""Settings that changed, which are named on a screen."""
+"""Number of changed settings that a screen names."""
 
 
 def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dict[str, Any]:
@@ -29,19 +30,19 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         "where": where(comparison),
         **asdict(comparison),
         "false_discovery_rate": FALSE,
-        "conditions": [_condition(each) for each in judgements],
+        "conditions": [*map(_condition, judgements)],
     }
 
 
 def _condition(judgement: Judgement) -> dict[str, Any]:
-    fact = {k: value for k, value in asdict(judgement).items() if k != "why"}
-    return {**fact.pop("condition"), **fact, "sentence": judged(judgement)}
+    facts = {name: value for name, value in vars(judgement).items() if name != "why"}
+    return {**vars(facts.pop("condition")), **facts, "sentence": describe_judgement(judgement)}
 
 
 def changed_settings(comparison: Comparison, most: int | None = None) -> list[str]:
-    """Return the settings that new results do not share with the base, a line a result.
+    """Return a line for each new result on the settings that differ from the base's.
 
-    With ``most`` only the first so many are named.
+    ``most`` is the number of settings to name; all by default.
     """
     lines = []
     for label, settings in comparison.changed_settings.items():
@@ -58,12 +59,12 @@ def verdict(comparison: Comparison) -> str:
     base = comparison.results[0].label
     several = len({change.variant for change in finals}) > 1
     changed = [change for change in finals if not change.unchanged] or finals[:1]
-    parts = [_sentence(change, base, several=several) for change in changed]
+    parts = [_describe(change, base, several=several) for change in changed]
     return " ".join([*parts, *unchanged(comparison, [c for c in finals if c not in changed])])
 
 
-def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
-    """Yield the masks that are as they were, a sentence a result."""
+def unchanged(comparison: Comparison, masks: Iterable[MaskChange]) -> Iterator[str]:
+    """Yield a sentence for each result on its masks that did not change."""
     base = comparison.results[0].label
     for result, rows in groupby(masks, lambda row: row.result):
         names = dict.fromkeys(row.variant for row in rows)
@@ -71,21 +72,17 @@ def unchanged(comparison: Comparison, masks: Iterable[Change]) -> Iterator[str]:
         yield f"{listing([*names])}{of}: every frame as in {base}."
 
 
-def _sentence(change: Change, base: str, *, several: bool) -> str:
-    what, rate = f"{change.result} instead of {base}", f"{TESTED} of {change.stage}"
-    said = sentence(change.difference[TESTED], what, rate, (change.base, change.new))
-    if change.result == change.variant or not several:
-        return said
-    return f"{change.variant}: {said[0].lower()}{said[1:]}"
+def _describe(change: MaskChange, base: str, *, several: bool) -> str:
+    new = _mask_name(change.result, change.variant) if several else change.result
+    return describe_change(change.difference[TESTED], new, base, (change.base, change.new))
 
 
 def where(comparison: Comparison) -> list[str]:
     """Return where final masks are surely better or worse: regions, frames and drives."""
-    still = {(each.result, each.variant) for each in comparison.finals() if each.unchanged}
+    still = {(mask.result, mask.variant) for mask in comparison.finals() if mask.unchanged}
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
-    masks = {mask: None for mask in masks if mask not in still}
     return [
-        *(_by_region(comparison, *mask) for mask in masks),
+        *(_by_region(comparison, *mask) for mask in masks if mask not in still),
         *_disagreements(comparison),
         *changed_drives(comparison),
     ]
@@ -101,40 +98,40 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
             parts.append(f"{word} everywhere")
         elif names:
             parts.append(f"{word} ({'; '.join(names)})")
-    told = ", ".join(parts) or "no change is sure in any"
-    return f"{_whose(result, variant)} by region: {told}"
+    changes = ", ".join(parts) or "no change is sure in any"
+    return f"{_mask_name(result, variant)} by region: {changes}"
 
 
-def _whose(result: str, variant: str) -> str:
+def _mask_name(result: str, variant: str) -> str:
     return result if result == variant else f"{variant} of {result}"
 
 
 def _disagreements(comparison: Comparison) -> Iterator[str]:
-    for result in dict.fromkeys(each.result for each in comparison.disagreements):
-        first, *rest = (each for each in comparison.disagreements if each.result == result)
+    for result, frames in groupby(comparison.disagreements, lambda frame: frame.result):
+        first, *rest = frames
         most = percent(first.base_right + first.new_right, 1)
-        frames = [f"{first.frame} ({most} % of the pixels)", *(str(each.frame) for each in rest)]
-        yield f"{result} disagrees most on frames {', '.join(frames)}"
+        named = [f"{first.frame} ({most} % of the pixels)", *(str(frame.frame) for frame in rest)]
+        yield f"{result} disagrees most on frames {', '.join(named)}"
 
 
 def changed_drives(comparison: Comparison) -> list[str]:
-    """Return on how many single drives each final mask changed, and in which direction."""
+    """Return a line for each final mask: on how many drives it changed, in which direction."""
     lines = []
     for mask in dict.fromkeys((row.result, row.variant) for row in comparison.drives):
-        own = [row for row in comparison.drives if (row.result, row.variant) == mask]
-        tested = sum(row.q is not None for row in own)
-        changed = [row for row in own if row.changed]
+        drives = [row for row in comparison.drives if (row.result, row.variant) == mask]
+        tested = sum(row.q is not None for row in drives)
+        changed = [row for row in drives if row.changed]
         worse = sum(row.difference.mean > 0 for row in changed)
         lines.append(
-            f"{_whose(*mask)}: {TESTED} surely changed on {len(changed)} of {tested} drives "
+            f"{_mask_name(*mask)}: {TESTED} surely changed on {len(changed)} of {tested} drives "
             f"(worse on {worse}, better on {len(changed) - worse}; false discovery rate "
             f"{percent(FALSE, 0)} %)"
         )
     return lines
 
 
-def judged(judgement: Judgement) -> str:
-    """Return what was found of a condition, and whether it holds."""
+def describe_judgement(judgement: Judgement) -> str:
+    """Return a sentence on the value that a condition limits, and whether it holds."""
     condition, drives = judgement.condition, judgement.drives
     if judgement.holds is None:
         return judgement.why
@@ -151,12 +148,12 @@ def judged(judgement: Judgement) -> str:
 
 
 def headline(holds: Sequence[bool | None]) -> str:
-    """Return whether limits were kept: of each whether it was exceeded, None if not judged."""
-    if not any(each is not False for each in holds):
+    """Return whether all limits were kept; ``holds`` are as of `Judgement.holds`."""
+    if all(exceeded is False for exceeded in holds):
         return f"passed, {len(holds)} limit{'s' * (len(holds) > 1)} kept"
     counts = {"exceeded": holds.count(True), "not judged": holds.count(None)}
-    found = [f"{count} of {len(holds)} limits {word}" for word, count in counts.items() if count]
-    return f"failed, {listing(found)}"
+    parts = [f"{count} of {len(holds)} limits {word}" for word, count in counts.items() if count]
+    return f"failed, {listing(parts)}"
 
 
 DISCOVERY: Final = (
@@ -168,24 +165,25 @@ DISCOVERY: Final = (
 def junit_xml(comparison: Comparison, judgements: Iterable[Judgement]) -> bytes:
     """Return JUnit's XML, as CI systems read it.
 
-    A case has what changed, and one a condition and result fails if the condition holds. One that
-    could not be judged is an error.
+    One case tells what changed. There is another for each condition and result, which is a failure
+    if the condition holds, and an error if it could not be judged.
     """
-    labels = ", ".join(each.label for each in comparison.results)
+    labels = ", ".join(result.label for result in comparison.results)
     lines = [*changed_settings(comparison), verdict(comparison), *where(comparison)]
     cases = [("compare", labels, "system-out", lines)]
-    for each in judgements:
-        kind = {True: "failure", False: "system-out", None: "error"}[each.holds]
-        cases.append((each.condition.text, each.result, kind, judged(each).splitlines()))
+    for judgement in judgements:
+        kind = {True: "failure", False: "system-out", None: "error"}[judgement.holds]
+        texts = describe_judgement(judgement).splitlines()
+        cases.append((judgement.condition.text, judgement.result, kind, texts))
     suite = ElementTree.Element("testsuite", name=visible(labels))
     for what, name, kind, texts in cases:
         about = {"classname": visible(what), "name": visible(name)}
         part = ElementTree.SubElement(ElementTree.SubElement(suite, "testcase", about), kind)
-        said = "\n".join(map(visible, texts))
+        text = "\n".join(map(visible, texts))
         if kind == "system-out":
-            part.text = said
+            part.text = text
         else:
-            part.set("message", said)
+            part.set("message", text)
     suite.set("tests", str(len(cases)))
     for count in ("error", "failure"):
         suite.set(f"{count}s", str(len(suite.findall(f"testcase/{count}"))))

@@ -1,7 +1,7 @@
 """The facts of a result: ``summary.json`` of a drive, ``fleet.json`` of many drives.
 
-Both are read into one tree of types, checked, and written from it. ``digest`` holds a checksum of
-the parts that are results, so that a changed number is damage.
+Both are read into one tree of types, which is checked, and written from it. ``digest`` is a
+checksum of the parts that are results, so a changed number is damage.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from roadeval.runtime.text import elided, visible, visible_lines
 
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
-"""The file that makes a folder a fleet's; written last."""
+"""The file that makes a folder a fleet's; it is written last."""
 
 
 Totals = dict[str, dict[str, dict[str, Any]]]
-"""Counts and rates by variant and stage; an undefined rate is NaN, or None where it was read."""
+"""Counts and rates by variant and stage; an undefined rate is NaN, or None once it is read."""
 
 
 @dataclass(frozen=True)
@@ -45,23 +45,22 @@ class DriveFacts:
     camera: str = ""
     width: int = 0
     height: int = 0
-    """Of the frames, in pixels."""
+    """Size of the frames in pixels."""
     rate_hz: float | None = None
     start_ns: int | None = None
     end_ns: int | None = None
     """Header stamps of the first and the last evaluated frame."""
     topics: list[str] = field(default_factory=list)
     calibration: Calibration | None = None
-    """The camera's, for images of this size."""
     ground: Ground | None = None
-    """The ground before it, too."""
+    """The camera's calibration and the ground before it, for images of this size."""
 
 
 @dataclass(frozen=True)
 class FrameAccount:
-    """What became of every frame of the image topic; None is unknown, as of a run that ended early.
+    """The number of frames of the image topic; None is unknown, as after a run that ended early.
 
-    ``skipped`` counts the others by reason.
+    ``skipped`` counts by reason the frames that were not evaluated.
     """
 
     in_log: int | None = None
@@ -75,7 +74,7 @@ class FrameAccount:
 
 @dataclass(frozen=True)
 class TrainingFacts:
-    """What the variants learnt from."""
+    """The data that the variants learnt from."""
 
     source: str | None = None
     frames: int = 0
@@ -92,9 +91,9 @@ class UnlabelledFacts:
     frames: int
     variant: str
     sign: str | None
-    """By which sign of doubt the variant's frames are ranked, if any, see `unlabelled.SIGNS`."""
+    """The sign of doubt that ranks the variant's frames, if any, see `unlabelled.SIGNS`."""
     look_at: list[int]
-    """Numbers of frames, the first of the rank first, one a scene."""
+    """Numbers of the frames that rank first, one for each scene."""
     differing: dict[str, dict[str, float]]
     """The mean share of pixels on which two variants differ, by both names."""
 
@@ -107,86 +106,85 @@ class EstimateFacts:
     """All frames that could be picked."""
     drawn: int
     labels: int
-    """Frames that were drawn at random, and how many of these are labelled and scored."""
+    """Frames that were drawn at random, and the number of them that are labelled and scored."""
     probability: float
-    """Of each frame to be drawn."""
+    """Probability of each frame to be drawn."""
     rates: dict[str, dict[str, Estimate]]
-    """By variant and rate of its final mask; empty where there is a problem."""
+    """Rates of final masks by variant and name; empty if there is a problem."""
     apart: dict[str, dict[str, float | None]]
-    """ERR of the frames that were picked by rank and train nothing, by frame and variant; in no
-    rate."""
+    """ERR of the frames that were picked by rank and train nothing, by frame and variant; no rate
+    counts them."""
     problem: str = ""
-    """Why there are no rates."""
+    """Reason why there are no rates."""
 
 
 @dataclass(frozen=True)
 class LogFacts:
-    """The log's file, and what tells it from another (`roadeval.logs.log.Log.digest`)."""
+    """The log's file, and the digest that identifies it (`roadeval.logs.log.Log.digest`)."""
 
     path: str
     digest: str
 
 
-class Document:
-    """A JSON document of facts, with its format and a checksum."""
+class FactsFile:
+    """A JSON file of facts, with its format and a checksum."""
 
     FORMAT: ClassVar[Mapping[str, Any]]
     AGAIN: ClassVar[str]
-    """How to make a damaged one again."""
+    """Advice how to make a damaged file again."""
     RESULTS: ClassVar[tuple[str, ...]]
-    """The parts that are results, which ``digest`` covers. The others may be changed by who moves
-    or renames files."""
+    """The parts that are results, which ``digest`` covers. Whoever moves or renames files may
+    change the others."""
     OPTIONAL: ClassVar[tuple[str, ...]] = ()
-    """Parts that are left out where they are empty."""
+    """Parts that are left out if they are empty."""
     VALUES: ClassVar[int] = VALUES
-    """Values that are read at most."""
+    """Greatest number of values that are read."""
     run: dict[str, Any]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the content of the document; undefined numbers become None."""
-        known = {k: value for k, value in self.content().items() if value or k not in self.OPTIONAL}
-        document = plain({"format": self.FORMAT, **known})
+        """Return the content of the file; undefined numbers become None."""
+        parts = {k: part for k, part in self.content().items() if part or k not in self.OPTIONAL}
+        document = plain({"format": self.FORMAT, **parts})
         return {**document, "digest": digest_of(document, self.RESULTS)}
 
     def content(self) -> dict[str, Any]:
-        """Return the parts of the document."""
+        """Return the parts of the file."""
         return asdict(self)  # type: ignore[call-overload]
 
     @classmethod
     def read_content(cls, content: Any) -> Any:
-        """Return the parts of a document as the fields have them."""
+        """Return the parts of a file as the fields have them."""
         return content
 
     def text(self) -> str:
-        """Return the document."""
+        """Return the text of the file."""
         return json_text(self.as_dict())
 
     @classmethod
     def parse(cls, text: str | bytes, where: object) -> Self:
-        """Read a document, whose origin begins the message of an error.
+        """Read the text of a file from ``where``, which begins the message of an error.
 
         A `ResultsError` if it is damaged or of another format.
         """
         try:
             content = read_json(text, cls.VALUES)
         except ValueError as error:
-            raise cls._damaged(where, error) from error
+            raise cls._damage(where, error) from error
         check_format(content, cls.FORMAT, where)
         try:
             facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
         except ValidationError as error:
-            errors = error.errors(include_url=False, include_input=False)
-            wrong = [each["loc"][0] for each in errors]
+            wrong = [e["loc"][0] for e in error.errors(include_url=False, include_input=False)]
             part = next((name for name in wrong if name in content), wrong[0])
             part = "difference" if part == "effects" and part not in content else part
-            raise cls._damaged(where, f"`{part}` is not what it must be") from error
+            raise cls._damage(where, f"`{part}` is not what it must be") from error
         if not is_as_written(content):
-            raise cls._damaged(where, "its content is not what was written")
+            raise cls._damage(where, "its content is not what was written")
         return facts
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a document's file; a `ResultsError` if there is none, or as of `parse`."""
+        """Read a file; a `ResultsError` if there is none, or as in `parse`."""
         try:
             return cls.parse(read_bounded(path), path)
         except OSError as error:
@@ -195,53 +193,53 @@ class Document:
                 "roadeval replay, or roadeval fleet"
             ) from error
         except ValueError as error:
-            raise cls._damaged(path, error) from error
+            raise cls._damage(path, error) from error
 
     @property
     def evaluation(self) -> EvaluationSettings:
-        """The settings of the evaluation; the defaults where the run states none.
+        """The settings of the evaluation, by default those of this version.
 
         A `ResultsError` if they are damaged.
         """
-        given = self.run.get("evaluation", {})
-        known = {each.name for each in fields(EvaluationSettings)}
+        stated = self.run.get("evaluation", {})
+        names = {setting.name for setting in fields(EvaluationSettings)}
         try:
-            return EvaluationSettings(**{name: given[name] for name in known & {*given}})
+            return EvaluationSettings(**{name: stated[name] for name in names & {*stated}})
         except (TypeError, ValueError) as error:
             what = "`run.evaluation` is not what it must be"
-            raise self._damaged("a summary", what) from error
+            raise self._damage("a summary", what) from error
 
     @classmethod
-    def _damaged(cls, where: object, what: object) -> ResultsError:
+    def _damage(cls, where: object, what: object) -> ResultsError:
         return ResultsError(f"{where}: damaged ({what}); {cls.AGAIN}")
 
 
 @dataclass(frozen=True)
-class Facts(Document):
+class Facts(FactsFile):
     """The facts of one drive: the content of ``summary.json``."""
 
     verdict: str
     drive: DriveFacts
     frames: FrameAccount
     totals: Totals
-    """Empty where nothing was scored."""
+    """Empty if nothing was scored."""
     beyond: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Of each final mask: how well it follows the edge, how much it flickers, error episodes."""
+    """Numbers of each final mask beyond its rates: edges, flicker, error episodes."""
     curves: Totals = field(default_factory=dict)
-    """Over all thresholds, by variant and stage that says how probable road is."""
+    """Key figures over all thresholds, by variant and stage with a probability of road."""
     thresholds: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """By a variant that learns nothing: its ``own`` threshold on how probable road is, the
-    ``threshold`` that errs least on the training frames, and the evaluated frames' ``ERR`` at it,
-    of all pixels together; and the ``lines`` of its settings that make it so."""
+    """By variant that learns nothing: its ``own`` threshold on the probability of road, the
+    ``threshold`` that is best on the training frames, ``ERR`` of all evaluated pixels at it, and
+    the ``lines`` of its settings that set it."""
     effects: list[Effect] = field(default_factory=list)
     """The paired differences of the drive."""
     oracles: dict[str, Totals] = field(default_factory=dict)
-    """Totals where a stage was replaced by the truth."""
+    """Totals with a stage replaced by the truth."""
     misfits: list[str] = field(default_factory=list)
-    """Truth or masks that do not fit the images, a sentence each; the verdict begins with them."""
+    """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
     windows: int = 0
     claims: dict[str, dict[str, int]] = field(default_factory=dict)
-    """In how many windows each claim of the paper holds."""
+    """Number of windows in which each claim of the paper holds."""
     health: dict[str, dict[str, int]] = field(default_factory=dict)
     examples: list[int] = field(default_factory=list)
     """The frames of figure 2."""
@@ -250,27 +248,27 @@ class Facts(Document):
     """Mean time of a frame, by variant and stage."""
     warnings: list[str] = field(default_factory=list)
     losses: list[str] = field(default_factory=list)
-    """What was lost of the log, and frames on which a stage failed."""
+    """Losses of the log, and frames on which a stage failed."""
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the run."""
     settings: dict[str, dict[str, Any]] = field(default_factory=dict)
     """The pipelines' settings, by variant."""
     methods: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """What stages say of themselves, as networks do."""
+    """Facts that stages state about themselves, as networks do."""
     versions: dict[str, str] = field(default_factory=dict)
     unlabelled: UnlabelledFacts | None = None
-    """None where every frame has truth."""
+    """None if every frame has truth."""
     estimate: EstimateFacts | None = None
-    """Rates of the whole drive, where picked frames are the truth."""
+    """Rates of the whole drive, if picked frames are the truth."""
     log: LogFacts | None = None
-    """None of a run that ended early."""
+    """None after a run that ended early."""
     masks: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Labels that are not in the log: masks of other systems by their variant, and ``truth``."""
     tables: dict[str, TableFacts] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     """The files of the results folder; a recording has none."""
     cameras: dict[str, Facts] = field(default_factory=dict)
-    """Of a rig: each camera's own, by its name."""
+    """The facts of each camera of a rig, by its name."""
 
     FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
     AGAIN = "make it again with roadeval replay"
@@ -289,13 +287,13 @@ class Facts(Document):
     @cached_property
     def finals(self) -> dict[str, str]:
         """Each scored variant's final stage."""
-        return final_stages((name, stage) for name, own in self.totals.items() for stage in own)
+        return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
 
     def content(self) -> dict[str, Any]:
-        """Return the parts of the document: differences stand by what is subtracted.
+        """Return the parts of the file, with differences by the variant that is subtracted.
 
-        ``difference`` is filtered minus unfiltered, by stage; by variant each other final mask
-        minus that of ``unfiltered``, that of ``blind``, or that of the method that was tuned.
+        ``difference`` is filtered minus unfiltered, by stage. The other parts are by variant each
+        final mask minus that of ``unfiltered``, of ``blind``, or of the method that was tuned.
         """
         names = "difference", "against_unfiltered", "against_blind", "against_method"
         parts: dict[str, dict[str, Any]] = {name: {} for name in names}
@@ -316,7 +314,7 @@ class Facts(Document):
 
     @classmethod
     def read_content(cls, content: Any) -> Any:
-        """Return a document's content with its differences as effects."""
+        """Return a file's content with its differences as effects."""
         names = "base", "variant", "stage", "final", "rates"
         against = {"unfiltered": UNFILTERED, "blind": BASELINE, "method": ""}
         try:
@@ -341,12 +339,12 @@ class Facts(Document):
 
     @property
     def final_effects(self) -> list[Effect]:
-        """Those of final masks."""
-        return [each for each in self.effects if each.final]
+        """The differences of final masks."""
+        return [effect for effect in self.effects if effect.final]
 
     @property
     def log_digest(self) -> str | None:
-        """What tells the log from another, where it is known."""
+        """The digest that identifies the log, if it is known."""
         return self.log.digest if self.log else None
 
 
@@ -360,7 +358,7 @@ class Member:
     source: str
     group: str | None = None
     tags: dict[str, str] = field(default_factory=dict)
-    """As the columns of the table ``drives``."""
+    """Values by tag; each tag is a column of the table ``drives``."""
 
 
 @dataclass(frozen=True)
@@ -375,23 +373,23 @@ class StratumFacts:
 
 
 @dataclass(frozen=True)
-class FleetFacts(Document):
+class FleetFacts(FactsFile):
     """The facts of many drives: the content of ``fleet.json``."""
 
     verdict: str
     version: str
-    """Of roadeval."""
+    """Version of roadeval."""
     drives: list[Member]
     counts: dict[str, int]
     """Drives by status."""
     frames: int
     """Evaluated frames."""
     failed: dict[str, str]
-    """Why drives failed."""
+    """Reasons why drives failed."""
     totals: Totals
-    """Of each final mask: the mean over drives, and of all pixels together."""
+    """Rates of each final mask: the mean over drives, and from all pixels together."""
     effects: list[Effect]
-    """The differences of final masks: within the drive where there is one, else over drives."""
+    """The differences of final masks: within the drive if there is only one, else over drives."""
     strata: list[StratumFacts]
     warnings: list[str]
     run: dict[str, Any] = field(default_factory=dict)
@@ -400,7 +398,7 @@ class FleetFacts(Document):
     @property
     def finals(self) -> dict[str, str]:
         """Each scored variant's final stage."""
-        return {variant: stage for variant, own in self.totals.items() for stage in own}
+        return {variant: stage for variant in self.totals for stage in self.totals[variant]}
 
     @property
     def final_effects(self) -> list[Effect]:
@@ -423,39 +421,38 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def check_format(content: Any, form: Mapping[str, Any], where: object) -> None:
-    """Raise a `ResultsError` unless the content of a document is of a format."""
-    found = content.get("format") if isinstance(content, dict) else None
-    number = found.get("version") if isinstance(found, dict) else None
-    if not isinstance(number, int) or found != {**form, "version": number}:
+    """Raise a `ResultsError` unless the content of a file is of a format."""
+    stated = content.get("format") if isinstance(content, dict) else None
+    number = stated.get("version") if isinstance(stated, dict) else None
+    if not isinstance(number, int) or stated != {**form, "version": number}:
         raise ResultsError(f"{where}: not of format {form['name']}; make the results again")
     if number != form["version"] or "digest" not in content:
         versions = content.get("versions", {"roadeval": content.get("version")})
         made_by = versions.get("roadeval") if isinstance(versions, dict) else None
         remedy = "use a new folder" if form == FLEET_FORMAT else "replay the log again"
-        told = another_format(made_by, later=number > form["version"], remedy=remedy)
-        raise ResultsError(f"{where}: {told}")
+        problem = another_format(made_by, later=number > form["version"], remedy=remedy)
+        raise ResultsError(f"{where}: {problem}")
 
 
 def another_format(version: object, *, later: bool, remedy: str = "replay the log again") -> str:
     """Return a sentence on results of another format, with the version that wrote them if known."""
+    made_by = f"roadeval {visible(str(version))}"
     if later:
-        made = (
-            f"roadeval {visible(str(version))}, a later version" if version else "a later version"
-        )
-        return f"made by {made}: update roadeval"
-    made = f"roadeval {visible(str(version))}" if version else "an earlier version of roadeval"
-    return f"made by {made}, whose format is no longer read: {remedy}"
+        made_by = f"{made_by}, a later version" if version else "a later version"
+        return f"made by {made_by}: update roadeval"
+    made_by = made_by if version else "an earlier version of roadeval"
+    return f"made by {made_by}, whose format is no longer read: {remedy}"
 
 
 def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:
-    """Return the ``digest`` of a JSON document: which parts it covers, and their SHA-256."""
+    """Return the ``digest`` of a JSON file: the parts that it covers, and their SHA-256."""
     covered = [part for part in parts if part in content]
     text = json.dumps({part: content[part] for part in covered}, allow_nan=False, sort_keys=True)
     return {"parts": covered, "sha256": hashlib.sha256(text.encode()).hexdigest()}
 
 
 def is_as_written(content: Mapping[str, Any]) -> bool:
-    """Return whether a document agrees with its ``digest``."""
+    """Return whether the content of a JSON file agrees with its ``digest``."""
     try:
         stated = content["digest"]
         return bool(stated == digest_of(content, stated["parts"]))
@@ -464,14 +461,14 @@ def is_as_written(content: Mapping[str, Any]) -> bool:
 
 
 def json_text(value: Any) -> str:
-    """Write what JSON has as a document; characters that cannot be seen are escaped."""
+    """Return a value of JSON as the text of a file; invisible characters are escaped."""
     return visible_lines(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def plain(value: Any) -> Any:
-    """Turn mappings, sequences, paths and undefined numbers into what JSON has.
+    """Return mappings, sequences, paths and undefined numbers as values of JSON.
 
-    A long text, as of a topic's name, is shortened to what is read again.
+    A text is shortened to the length that can be read again.
     """
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}

@@ -1,8 +1,8 @@
 """A fleet's folder: the results folders of its drives, and a cache of their tables in Parquet.
 
-Beside a drive's results lies how they were made, written last. A drive is done if that is there,
-and says that the results were made of the same log, settings, model and version. Of each drive the
-frames are cached, and the scores that follow from them; a cache that is missing or old is made anew
+Beside a drive's results lies a file that says how they were made; it is written last. A drive is
+done if that file is there and names the same log, settings, model and version. The frames of each
+drive are cached, and the scores that follow from them; a cache that is missing or old is made anew
 from the results.
 """
 
@@ -21,18 +21,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, is_plain
+from roadeval.data import is_plain
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import is_final, joined, only
+from roadeval.evaluation.tables import is_final, joined, only, values_of
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
-    Document,
     Facts,
+    FactsFile,
     FleetFacts,
     Member,
     check_format,
@@ -51,6 +51,7 @@ from roadeval.results.tables import (
     read_table,
     write_parquet,
 )
+from roadeval.results.verdict import focus_of
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, check_output, leads_outside, put, sha256_of, writing
 from roadeval.runtime.text import is_utf8, visible
@@ -60,40 +61,41 @@ if TYPE_CHECKING:
 
 RUN: Final = "run.toml"
 FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in OF_DRIVES))
-"""The files of a fleet's folder; beside them lie folders with files of each drive."""
+"""The files of a fleet's folder; beside them lie folders with the files of its drives."""
 RESULTS: Final = "results"
 PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
-"""Frames that the table of the worst names."""
+"""Number of frames in the table of the worst."""
 CACHED: Final = ("frames", "regions", "scores", "worst")
 """Tables of each drive that are cached in folders of these names; ``regions`` of final masks."""
 
 
 def results_path(folder: Path, drive: str) -> Path:
     """Return the results folder of a drive."""
-    return inside(folder / RESULTS / drive, folder)
+    return check_inside(folder / RESULTS / drive, folder)
 
 
 def made_path(folder: Path, drive: str) -> Path:
     """Return the file that says how a drive's results were made."""
-    return inside(folder / RESULTS / f"{drive}.json", folder)
+    return check_inside(folder / RESULTS / f"{drive}.json", folder)
 
 
 def recording_path(folder: Path, drive: str) -> Path:
-    """Return the recording of a drive, which may not have been kept."""
-    return inside(folder / RECORDINGS / f"{drive}.rrd", folder)
+    """Return the path of a drive's recording, which may not exist."""
+    return check_inside(folder / RECORDINGS / f"{drive}.rrd", folder)
 
 
 def cached_path(folder: Path, name: str, drive: str) -> Path:
-    """Return a table of a drive; its folder's name is no partition's, as ``drive=ID``.
+    """Return the path of a drive's cached table.
 
-    pandas and Arrow would read that as a second column ``drive``, and refuse the folder.
+    Its folder is not called ``drive=ID``, as partitions are: pandas and Arrow would read that as a
+    second column ``drive``, and refuse the folder.
     """
-    return inside(folder / name / drive / f"{name}.parquet", folder)
+    return check_inside(folder / name / drive / f"{name}.parquet", folder)
 
 
-def inside(path: Path, folder: Path) -> Path:
+def check_inside(path: Path, folder: Path) -> Path:
     """Return a path in a fleet's folder; a `ResultsError` if a link there leads out of it."""
     if leads_outside(path, folder):
         raise ResultsError(f"{path}: a link leads out of the fleet's folder; remove it")
@@ -101,24 +103,24 @@ def inside(path: Path, folder: Path) -> Path:
 
 
 @dataclass(frozen=True)
-class Made(Document):
-    """How the results of a drive were made; its numbers are in the results themselves."""
+class Made(FactsFile):
+    """How the results of a drive were made; its numbers are in the results."""
 
     drive: str
     """Its name in the fleet."""
     asked: str
-    """Digest of what was asked: settings, model and version."""
+    """Digest of the settings, the model and the version."""
     stamp: Mapping[Any, Any] | None
-    """Sizes and times of the log's files, which show cheaply whether it has changed; None where
-    they could not be read. A file's name may hold bytes that are no text."""
+    """Sizes and times of the log's files, a cheap way to notice changes; None if they could not be
+    read. A file's name may hold bytes that are no text."""
     fold: int | None = None
     model: str | None = None
     problem: str = ""
-    """Why the drive failed: there are no results then."""
+    """Reason why the drive failed: there are no results then."""
     exit_code: int = 0
     seconds: float | None = None
     results: str = ""
-    """SHA-256 of the results' summary, stated where it is written; empty where the drive failed."""
+    """SHA-256 of the results' summary, set by `write`; empty if the drive failed."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
@@ -138,17 +140,17 @@ def read_made(folder: Path, drive: str) -> Made | None:
         made = Made.parse(read_bounded(path), path)
         summary = "" if made.problem else sha256_of(results_path(folder, drive) / SUMMARY)
     except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
-        return None  # not there, not ours, or not whole: it is made again
+        return None  # missing, of another version, or incomplete: it is made again
     except OSError as error:
         raise ResultsError(f"{path}: {error.strerror}") from error
     return made if (made.drive, made.results) == (drive, summary) else None
 
 
 class FleetFolder:
-    """Reads a fleet's folder, perhaps made on another machine, by anybody.
+    """Reads a fleet's folder, which may come from another machine and from anybody.
 
-    Nothing that lies elsewhere is read or written, where its links and tables lead. A
-    `ResultsError` if it is no fleet's folder, or one of another version.
+    Nothing outside it is read or written, wherever its links and tables lead. A `ResultsError` if
+    it is no fleet's folder, or one of another version.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -168,23 +170,23 @@ class FleetFolder:
     def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
         """Read a table of all drives, or of some of them.
 
-        Those of `roadeval.results.schema.OF_DRIVES` are the folder's own, ``frames`` and
-        ``regions``, which have the rows of final masks, those cached of each drive; others are read
-        from the drives' results.
+        The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and those of
+        `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
+        of final masks.
         """
         if name in OF_DRIVES:
             rows = read_parquet([self.path / f"{name}.parquet"], name)
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
-        known = self.drives
-        scored = known["drive"][known["evaluated"].fillna(0) > 0]
+        scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
         if name in CACHED:
             paths = [cached_path(self.path, name, drive) for drive in chosen]
             return read_parquet(paths, name)[[*TABLES[name].names]]
-        folders = ((drive, ResultsFolder(results_path(self.path, drive))) for drive in chosen)
-        return joined(
-            [read_table(name, ""), *(of_drive(own, name, drive) for drive, own in folders)]
+        folders = (ResultsFolder(results_path(self.path, drive)) for drive in chosen)
+        tables = (
+            of_drive(results, name, drive) for results, drive in zip(folders, chosen, strict=True)
         )
+        return joined([read_table(name, ""), *tables])
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -198,7 +200,7 @@ class FleetFolder:
 
     @cached_property
     def names(self) -> dict[str, str]:
-        """The drives' names for people, no two of them equal, by their names in the fleet."""
+        """The drives' distinct names for people, by their names in the fleet."""
         names = dict(self.drives["name"])
         times = Counter(names.values())
         return {drive: name if times[name] == 1 else drive for drive, name in names.items()}
@@ -215,19 +217,19 @@ class FleetFolder:
 
     @cached_property
     def effects(self) -> pd.DataFrame:
-        """The rows of ``effects`` of the final masks' ERR, where it is known."""
+        """The rows of ``effects`` of the final masks' ERR, if it is known."""
         rows = self.table("effects")
         return rows[rows["final"] & (rows["metric"] == TESTED) & rows["mean"].notna()]
 
     @cached_property
-    def first_scores(self) -> pd.DataFrame:
-        """The rows of ``scores`` of the first variant's final mask, on all pixels, by drive."""
-        first = only(self.scores, final=True, region=ALL, variant=next(iter(self.finals), ""))
-        return first.set_index("drive", drop=False)
+    def focus_scores(self) -> pd.DataFrame:
+        """The rows of ``scores`` of the focus's final mask, on all pixels, by drive."""
+        scores = only(self.scores, final=True, region=ALL, variant=focus_of(self.finals))
+        return scores.set_index("drive", drop=False)
 
     @cached_property
     def regions(self) -> pd.DataFrame:
-        """See `roadeval.evaluation.tables.by_region`: of all drives together."""
+        """`roadeval.evaluation.tables.by_region` of all drives together."""
         rows = only(self.scores, final=True)
         return tables.by_region(rows[rows["region"] != ALL])
 
@@ -237,7 +239,7 @@ class FleetFolder:
         return self.table("worst")
 
     def picture(self, frame: Mapping[str, Any]) -> bytes | None:
-        """Return the JPEG of a row of ``worst``; None of one from elsewhere, or that is cut."""
+        """Return the JPEG of a row of ``worst``; None if it lies elsewhere, or is cut off."""
         path = self.path / str(frame["picture"] or "")
         if not path.resolve().is_relative_to(self.path.resolve()):
             return None
@@ -253,7 +255,7 @@ class FleetFolder:
 
     @property
     def height(self) -> int:
-        """Height of the frames in pixels; 0 where drives differ."""
+        """Height of the frames in pixels; 0 if drives differ."""
         heights = self.drives["height"][self.drives["evaluated"].fillna(0) > 0].dropna().unique()
         return int(heights[0]) if len(heights) == 1 else 0
 
@@ -281,16 +283,16 @@ def cache(folder: Path, drive: str) -> None:
         "frames": frames,
         "regions": tables.finals(regions),
         "scores": scores(frames, regions, beyond_masks(results.facts, key)),
-        "worst": _pictured(folder, drive, frames).assign(rank=0),
+        "worst": _frames_with_pictures(folder, drive, frames).assign(rank=0),
     }
     write_parquet({files[name]: (name, rows[name]) for name in CACHED}, summary)
 
 
-def _pictured(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of ``worst``: of a drive's frames those that have pictures."""
-    rows = frames[frames["final"] & (frames["variant"] != BASELINE)]
+def _frames_with_pictures(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of ``worst``: the frames of a drive that have pictures."""
+    rows = frames[frames["final"] & (frames["variant"] == focus_of(values_of(frames, "variant")))]
     place = Path(PICTURES, drive)
-    stems = [path.stem for path in inside(folder / place, folder).glob("*.jpg")]
+    stems = [path.stem for path in check_inside(folder / place, folder).glob("*.jpg")]
     numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]
     rows = rows[~rows.duplicated("frame") & rows["frame"].isin(numbers)]
     return rows.assign(picture=[(place / f"{number}.jpg").as_posix() for number in rows["frame"]])
@@ -303,7 +305,7 @@ class FleetWriter:
         self.folder = Path(folder).absolute()
 
     def begin(self) -> None:
-        """Make the folder, or see that it is a fleet's of this version.
+        """Make the folder, or check that it is a fleet's folder of this version.
 
         A `ResultsError` if it is something else, or cannot be written to.
         """
@@ -328,7 +330,7 @@ class FleetWriter:
                 )
             (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
             for path in self.folder.iterdir():  # the folder may come from anybody
-                inside(path, self.folder)
+                check_inside(path, self.folder)
 
     def finish(
         self,
@@ -341,9 +343,9 @@ class FleetWriter:
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
-        The members are in the tables' order. ``run`` and ``run_toml`` are the configuration of the
-        fleet, as plain data and as a text. ``asked`` has the digests of what each drive's results
-        must have been made for; anything by default.
+        ``members`` are in the order of the tables. ``run`` and ``run_toml`` are the configuration
+        of the fleet, as plain data and as a text. ``asked`` are the digests of `Made.asked` that
+        drives must have; any by default.
         """
         # Two commands may replay drives of one folder together.
         with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
@@ -354,24 +356,24 @@ class FleetWriter:
         return facts
 
     def _write_tables(
-        self, members: Sequence[Member], asked: Mapping[str, str]
+        self, members: Sequence[Member], digests: Mapping[str, str]
     ) -> tuple[dict[str, pd.DataFrame], list[Effect]]:
-        """Write every table; all are whole before one takes its name.
+        """Write every table, all of them before the first one takes its name.
 
-        Returned are those of which the facts are made: ``drives``, and of ``scores`` and
-        ``effects`` the rows of final masks, on all pixels; and the differences within the only
-        drive, where one alone was scored.
+        Returned are the tables from which the facts follow: ``drives``, and the rows of ``scores``
+        and ``effects`` of final masks on all pixels; and the differences within the only drive, if
+        just one was scored.
         """
         tags = sorted({key for member in members for key in member.tags})
         rows: dict[str, list[Any]] = {"drives": [], "effects": [], "within": [], "cached": []}
         for member in members:
-            self._add(member, self._made(member.drive, asked), rows)
+            self._add(member, self._read_made(member.drive, digests), rows)
         try:
-            made = self._cached(rows["cached"])
-        except ResultsError:  # damaged: all of the cache is made anew
+            made = self._read_cache(rows["cached"])
+        except ResultsError:  # damaged: the cache is made anew
             for name in CACHED:
-                shutil.rmtree(inside(self.folder / name, self.folder), ignore_errors=True)
-            made = self._cached(rows["cached"], again=True)
+                shutil.rmtree(check_inside(self.folder / name, self.folder), ignore_errors=True)
+            made = self._read_cache(rows["cached"], again=True)
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
         words = made["worst"].astype({"drive": "str"})
@@ -404,8 +406,8 @@ class FleetWriter:
             rows["cached"].append(member.drive)
         rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
 
-    def _cached(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
-        """Return the cached sums of drives; what is missing or old is made from their results."""
+    def _read_cache(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
+        """Return the cached sums of drives; missing and old ones are made from their results."""
         for drive in drives:
             try:
                 cache(self.folder, drive)
@@ -418,13 +420,14 @@ class FleetWriter:
             for name in ("scores", "worst")
         }
 
-    def _made(self, drive: str, asked: Mapping[str, str]) -> Made:
+    def _read_made(self, drive: str, digests: Mapping[str, str]) -> Made:
+        """Return how a drive's results were made; a `ResultsError` if they are other ones."""
         made = read_made(self.folder, drive)
         if made is None:
             raise ResultsError(
                 f"{self.folder}: the results of {drive} have gone; run the same command again"
             )
-        if asked.get(drive, made.asked) != made.asked:
+        if digests.get(drive, made.asked) != made.asked:
             raise ResultsError(
                 f"{self.folder}: another command has replayed {drive} with other settings "
                 "meanwhile; run the same command again, or give each a folder of its own"

@@ -23,34 +23,33 @@ if TYPE_CHECKING:
 
 
 RUN: Final = "run.toml"
-"""The file that makes the run again."""
+"""The configuration file that repeats the run."""
 NAME_BYTES: Final = 255
-"""Of a file's name, at most, on the file systems that there are."""
+"""Greatest length of a file's name on common file systems."""
 
 
-def belonging(summary: Path) -> frozenset[str]:
-    """Return the names of the files that are results, by a summary, which may be missing."""
+def names_of_results(summary: Path) -> frozenset[str]:
+    """Return the names of the files that are results according to a summary, if there is one."""
     listed = None
     with suppress(OSError, ValueError, AttributeError):
         listed = read_json(read_bounded(summary)).get("files")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
-    # A summary may list anything: what cannot name a file of the folder is left out.
+    # A summary may list anything: names that no file of the folder can have are left out.
     plain = [name for name in names if Path(name).name == name != ".." and name.isprintable()]
-    own = {name for name in plain if len(name.encode()) <= NAME_BYTES}
-    return frozenset(own) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
+    listed_files = {name for name in plain if len(name.encode()) <= NAME_BYTES}
+    return frozenset(listed_files) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
 
 
-CONTENT: Final = Content(SUMMARY, belonging)
-"""What a new results folder replaces in one that is there."""
+CONTENT: Final = Content(SUMMARY, names_of_results)
+"""The files of an existing results folder that a new one replaces."""
 
 
 class ResultsWriter:
-    """Writes a results folder while frames arrive; to be used as a context.
+    """Writes a results folder while frames arrive; it is a context.
 
-    After `finish` it takes its name at the end of the context. Left by an exception, or without
-    `finish`, it removes what was begun; earlier results stay.
-
-    Every method raises a `ResultsError` if the folder cannot be written to.
+    The folder takes its name at the end of the context if `finish` was called. After an exception,
+    or without `finish`, it is removed, and earlier results stay. Every method raises a
+    `ResultsError` if the folder cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,11 +59,11 @@ class ResultsWriter:
 
     @property
     def folder(self) -> Path:
-        """Where the files lie until the end: for those that others write, as figures."""
+        """The folder of the files until the end, for others who write there, as figures are."""
         return self._new.partial
 
     def __enter__(self) -> Self:
-        with self.explained():
+        with self.explain_errors():
             self._new.begin()
             for name in OF_A_DRIVE:
                 self._open[name] = _Growing(self.folder, TABLES[name])
@@ -73,7 +72,7 @@ class ResultsWriter:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None and self._finished:
-                with self.explained():
+                with self.explain_errors():
                     self._new.publish()
         finally:
             for table in self._open.values():
@@ -83,7 +82,7 @@ class ResultsWriter:
 
     def append(self, lines: Mapping[str, str]) -> None:
         """Add lines of CSV to tables, by their names."""
-        with self.explained():
+        with self.explain_errors():
             for name, text in lines.items():
                 self._open[name].append(text)
 
@@ -97,7 +96,7 @@ class ResultsWriter:
 
         A table without rows is left out.
         """
-        with self.explained():
+        with self.explain_errors():
             for table in self._open.values():
                 table.file.close()
                 if not table.rows:
@@ -109,19 +108,19 @@ class ResultsWriter:
         self._finished = True
         return facts
 
-    def explained(self) -> AbstractContextManager[None]:
+    def explain_errors(self) -> AbstractContextManager[None]:
         """Turn an OSError inside the block into a `ResultsError`."""
         advice = "; choose another folder with `output.reports`"
         return writing(self._new.path, ResultsError, advice)
 
 
 class _Growing:
-    """A table that grows."""
+    """A table to which lines are appended."""
 
     def __init__(self, folder: Path, table: TableSchema) -> None:
         self.path = folder / f"{table.name}.csv"
         self.file = self.path.open("wb")
-        self.rows = -1  # the header is none
+        self.rows = -1  # the header is no row
         self._digest = hashlib.sha256()
         self.append(table.header)
 
@@ -138,24 +137,21 @@ class _Growing:
 
 
 class ResultsFolder:
-    """Reads a results folder.
+    """Reads a results folder of `ResultsWriter`, or the part of one ``camera`` of a rig.
 
-    It is as `ResultsWriter` left it. A `ResultsError` if it holds no results, or results of another
-    format. Of a rig it is that of one ``camera``, where that is named.
+    A `ResultsError` if it holds no results, or results of another format.
     """
 
     def __init__(self, folder: Path, camera: str = "") -> None:
         self._folder, self._camera = folder, camera
-        self._whole = Facts.read(folder / SUMMARY)
-        self.facts = self._whole.cameras[camera] if camera else self._whole
+        self._facts_of_all = Facts.read(folder / SUMMARY)
+        self.facts = self._facts_of_all.cameras[camera] if camera else self._facts_of_all
 
     def table(self, name: str) -> pd.DataFrame:
         """Read a table by its name in `roadeval.results.schema.TABLES`.
 
-        One that was not written, there being nothing to count, is empty. A `ResultsError` if it is
-        damaged, or not the one that the summary states.
+        A table that was not written is empty. A `ResultsError` if it is damaged, or not the one
+        that the summary states.
         """
-        return read_table(name, self._path(name), self._whole.tables, self._camera)
-
-    def _path(self, name: str) -> Path:
-        return self._folder / f"{name}.csv"
+        path = self._folder / f"{name}.csv"
+        return read_table(name, path, self._facts_of_all.tables, self._camera)

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
-from roadeval.evaluation.score.scoreboard import Effect, corrected
+from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import over_drives, strata
-from roadeval.evaluation.tables import COUNTS, MASK, grouped, only, rates_of
+from roadeval.evaluation.tables import COUNTS, MASK, group_rows, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
-from roadeval.results.sentences import verdict
+from roadeval.results.verdict import verdict
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
     import pandas as pd
 
 WARNINGS: Final = 5
-"""Kinds of warnings of single drives that are listed."""
+"""Number of kinds of drives' warnings that are listed."""
 
 
 def summarise(
@@ -31,12 +31,12 @@ def summarise(
     members: Sequence[Member],
     settings: EvaluationSettings,
     run: dict[str, Any],
-    alone: Sequence[Effect] = (),
+    within_one: Sequence[Effect] = (),
 ) -> FleetFacts:
-    """Make the facts of a fleet.
+    """Return the facts of a fleet.
 
-    ``tables`` has ``drives``, and of ``scores`` and ``effects`` the rows of final masks, on all
-    pixels. ``alone`` are the differences within the drive, where only one was scored.
+    ``tables`` are ``drives``, and the rows of ``scores`` and ``effects`` of final masks on all
+    pixels. ``within_one`` are the differences within the drive if only one was scored.
     """
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
@@ -48,19 +48,19 @@ def summarise(
     tags = [name for name in map(str, drives) if name.startswith(TAG)]
     grouping = effects.assign(group=effects["drive"].map(groups))
     means = grouping.merge(drives[["drive", *tags]], on="drive")
-    differences = [*alone]
+    differences = [*within_one]
     parts: list[StratumFacts] = []
-    for _, against in grouped(means, ["base"]) if not alone else ():
+    for _, against in group_rows(means, ["base"]) if not within_one else ():
         family = []
-        for (base, variant, stage), mask in grouped(against, ["base", "variant", "stage"]):
-            rates = {}
-            for (rate,), drive_means in grouped(mask, ["metric"]):
-                better = METRICS[rate].higher_is_better
-                rates[rate] = over_drives(drive_means, settings.confidence, higher_is_better=better)
+        for (base, variant, stage), mask in group_rows(against, ["base", "variant", "stage"]):
+            rates = {
+                rate: over_drives(drive_means, settings.confidence, rate)
+                for (rate,), drive_means in group_rows(mask, ["metric"])
+            }
             family.append(Effect(base, variant, stage, final=True, rates=rates))
             for tag, value, change in strata(only(mask, metric=TESTED), tags, settings.confidence):
                 parts.append(StratumFacts(base, variant, tag.removeprefix(TAG), value, change))
-        differences += corrected(family)
+        differences += correct_effects(family)
     totals = _totals(scores)
     return FleetFacts(
         verdict=" ".join([*_misfits(rows), verdict(totals, differences)]),
@@ -72,14 +72,14 @@ def summarise(
         totals=totals,
         effects=differences,
         strata=parts,
-        warnings=[*_of_copies(copies, cameras), *_of_drives(rows)],
+        warnings=[*_warnings_of_copies(copies, cameras), *_warnings_of_drives(rows)],
         run=run,
     )
 
 
 def _totals(scores: pd.DataFrame) -> Totals:
-    """Return the rates of each final mask: the drives' mean, and of all pixels together."""
-    by_mask = grouped(scores, MASK)
+    """Return the rates of each final mask: means of the drives, and from all pixels together."""
+    by_mask = group_rows(scores, MASK)
     sums = by_mask[[*COUNTS, "frames"]].sum()
     means = by_mask[[*METRICS]].mean().join(rates_of(sums, METRICS, "pooled_"))
     means.insert(0, "drives", by_mask.size())
@@ -91,11 +91,13 @@ def _totals(scores: pd.DataFrame) -> Totals:
     return totals
 
 
-def _of_copies(same: Mapping[str, str], cameras: Mapping[str, str | None]) -> Iterator[str]:
-    """Yield what it means that drives are of the same log: copies, or cameras of a rig."""
-    copies = {copy: of for copy, of in same.items() if cameras[copy] == cameras[of]}
-    if len(same) > len(copies):
-        yield "cameras of one log count as one drive in differences, which are of their mean"
+def _warnings_of_copies(
+    originals: Mapping[str, str], cameras: Mapping[str, str | None]
+) -> Iterator[str]:
+    """Yield how drives of the same log are counted: copies, or cameras of a rig."""
+    copies = {copy: of for copy, of in originals.items() if cameras[copy] == cameras[of]}
+    if len(originals) > len(copies):
+        yield "in differences the cameras of a log are averaged to one drive"
     if copies:
         copy, of = next(iter(copies.items()))
         count = len(copies)
@@ -107,7 +109,7 @@ def _of_copies(same: Mapping[str, str], cameras: Mapping[str, str | None]) -> It
 
 
 def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield on which drives truth or masks do not fit the images, with what the first one says."""
+    """Yield on which drives truth or masks do not fit the images, and the first one's sentence."""
     rows = [row for row in drives if row["misfits"]]
     if rows:
         named = listing([row["drive"] for row in rows[:WARNINGS]])
@@ -117,16 +119,15 @@ def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         yield f"Truth or masks do not fit the images on {where}: {first}"
 
 
-def _of_drives(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the drives' own warnings, those that differ by numbers alone together."""
+def _warnings_of_drives(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the drives' warnings, together if they differ by numbers only."""
     alike: dict[str, list[tuple[str, str]]] = {}
     for row in drives:
         for sentence in (row["warnings"] or "").splitlines():
             alike.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
-    ranked = sorted(alike.values(), key=lambda own: -len(own))
-    for own in ranked[:WARNINGS]:
-        drive, sentence = own[0]
-        more = f" (and {len(own) - 1} more alike)" if len(own) > 1 else ""
+    ranked = sorted(alike.values(), key=lambda warnings: -len(warnings))
+    for (drive, sentence), *others in ranked[:WARNINGS]:
+        more = f" (and {len(others)} more alike)" if others else ""
         yield f"{drive}{more}: {sentence}"
     if len(ranked) > WARNINGS:
         yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"

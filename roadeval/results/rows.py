@@ -1,4 +1,4 @@
-"""Rows of the tables, typed as they are counted, and their text in CSV.
+"""Rows of the tables, and their text in CSV.
 
 Numbers are written so that they read back the same. An undefined rate is an empty cell.
 """
@@ -16,7 +16,7 @@ from roadeval.data import Doubt, Frame, FrameResult, Tally
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.thresholds import at_levels
 from roadeval.evaluation.score.unlabelled import SIGNS
-from roadeval.evaluation.tables import KEY, MASK, grouped, is_final, joined, totals
+from roadeval.evaluation.tables import KEY, MASK, group_rows, is_final, joined, totals
 from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, TYPES, UNSCORED
 from roadeval.runtime.text import visible
 
@@ -35,41 +35,44 @@ ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evalua
 
 
 class Key(NamedTuple):
-    """The first cells of every row."""
+    """The first two cells of every row."""
 
     drive: str
     camera: str
 
     def cells(self) -> str:
-        """Return both as cells of CSV, with the comma behind them."""
-        texts = ((text, text.replace('"', '""')) for text in map(visible, self))
-        return "".join(f'"{own}",' if set(text) & {",", '"'} else f"{text}," for text, own in texts)
+        """Return both as cells of CSV, with a comma behind each."""
+        cells = ""
+        for text in map(visible, self):
+            escaped = text.replace('"', '""')
+            cells += f'"{escaped}",' if set(text) & {",", '"'} else f"{text},"
+        return cells
 
 
 def doubt_rows(frame: Frame, doubts: Iterable[Doubt]) -> dict[str, list[Row]]:
     """Return the rows of ``unlabelled`` of a frame."""
     when = frame.number, frame.stamp_ns
-    rows = [(*when, e.variant, e.stage, *(getattr(e, sign) for sign in SIGNS)) for e in doubts]
+    rows = [(*when, d.variant, d.stage, *(getattr(d, sign) for sign in SIGNS)) for d in doubts]
     return {"unlabelled": rows}
 
 
 def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
-    """Return a frame's rows of each table of evaluated frames; empty for others."""
+    """Return the rows of an evaluated frame by table; no rows for other frames."""
     frame, tallies = result.frame, result.tallies
     number, finals = frame.number, {tally.variant: tally.stage for tally in tallies}
     when = number, frame.stamp_ns, frame.log_time_ns
     truth = result.truth_bits.checksum() if result.truth_bits else 0
     return {
-        "frames": [(*when, each.variant, each.stage, *_numbers(each), truth) for each in tallies],
+        "frames": [(*when, mask.variant, mask.stage, *_numbers(mask), truth) for mask in tallies],
         "regions": [
-            (number, each.variant, each.stage, region, *counts, counts.n)
-            for each in tallies
-            for region, counts in each.regions.items()
+            (number, mask.variant, mask.stage, region, *counts, counts.n)
+            for mask in tallies
+            for region, counts in mask.regions.items()
         ],
         "oracles": [
-            (number, each.variant, oracle, each.stage, *_numbers(each))
-            for oracle, own in result.oracles.items()
-            for each in own
+            (number, mask.variant, oracle, mask.stage, *_numbers(mask))
+            for oracle, masks in result.oracles.items()
+            for mask in masks
         ],
         "disagreements": [
             (number, one[0], other[0], *result.changes[*one, *other])
@@ -80,8 +83,8 @@ def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
                 *(number, variant, finals[variant], measure, f"{at}m" if at else "ahead"),
                 *(round(end, 3) for end in ends),
             )
-            for variant, own in result.metres.items()
-            for (measure, at), ends in zip(own.measures, own.ends[0].tolist(), strict=True)
+            for variant, metres in result.metres.items()
+            for (measure, at), ends in zip(metres.measures, metres.ends[0].tolist(), strict=True)
         ],
     }
 
@@ -93,12 +96,12 @@ def _numbers(tally: Tally) -> Row:
 def sum_rows(board: Scoreboard, windows: pd.DataFrame) -> dict[str, list[Row]]:
     """Return the rows of each table of sums over the drive.
 
-    Cells of heat maps that are never labelled, and levels of probabilities that do not occur, have
-    none.
+    Cells of heat maps that are never labelled, and levels of probabilities that do not occur, are
+    left out.
     """
     heat: list[Row] = []
-    for variant, each in board.heat.items():
-        side, sums = each.cells()
+    for variant, heat_map in board.heat.items():
+        side, sums = heat_map.cells()
         tops, lefts = sums[0].nonzero()
         cells = (tops * side, lefts * side, np.full_like(tops, side), *sums[:, tops, lefts])
         heat += [(variant, *cell) for cell in np.column_stack(cells).tolist()]
@@ -118,11 +121,11 @@ def sum_rows(board: Scoreboard, windows: pd.DataFrame) -> dict[str, list[Row]]:
 
 
 def csv_lines(key: Key, rows: Mapping[str, Iterable[Row]]) -> dict[str, str]:
-    """Return the lines of CSV of tables that have rows."""
+    """Return the lines of CSV of the tables that have rows."""
     start = key.cells()
     texts = {
-        name: "".join(f"{start}{','.join(map(_cell, row))}\n" for row in own)
-        for name, own in rows.items()
+        name: "".join(f"{start}{','.join(map(_cell, row))}\n" for row in table_rows)
+        for name, table_rows in rows.items()
     }
     return {name: text for name, text in texts.items() if text}
 
@@ -154,34 +157,34 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
 def scores(
     frames: pd.DataFrame, regions: pd.DataFrame, beyond: Sequence[Mapping[str, Any]]
 ) -> pd.DataFrame:
-    """Make the table ``scores`` of any number of drives: each mask, whole and region by region.
+    """Return the table ``scores`` of any number of drives: each mask on all pixels, and by region.
 
-    ``frames`` and ``regions`` are the tables of these names. ``beyond`` has what is known of final
-    masks besides, as of `beyond_masks`. A region counts on the frames that label any of it.
+    ``frames`` and ``regions`` are the tables of these names; ``beyond`` are further columns of
+    final masks, as of `beyond_masks`. A region counts on the frames that label any of it.
     """
     import pandas as pd
 
     by = [*KEY, *MASK]
-    whole = totals(frames, by).reset_index().assign(region=ALL, final=is_final)
+    masks = totals(frames, by).reset_index().assign(region=ALL, final=is_final)
     parts = totals(regions[regions["N"] > 0], [*by, "region"]).reset_index()
-    parts = parts.merge(whole[[*by, "final"]], on=by)
+    parts = parts.merge(masks[[*by, "final"]], on=by)
     if beyond:
-        known = pd.DataFrame([*beyond]).assign(final=True)
-        whole = whole.merge(known, on=[*KEY, "variant", "final"], how="left")
-    rows = joined([whole, parts])
-    order = grouped(rows, by).ngroup().to_numpy()
+        further = pd.DataFrame([*beyond]).assign(final=True)
+        masks = masks.merge(further, on=[*KEY, "variant", "final"], how="left")
+    rows = joined([masks, parts])
+    order = group_rows(rows, by).ngroup().to_numpy()
     return rows.iloc[np.argsort(order, kind="stable")].reindex(columns=TABLES["scores"].names)
 
 
 def beyond_masks(facts: Facts, key: Key) -> list[dict[str, Any]]:
-    """Return what a drive's facts know of each final mask beyond its counts, for `scores`."""
+    """Return the numbers of each final mask of a drive beyond its counts, for `scores`."""
+    names = ("boundary_F", "boundary_IoU", "flicker", "truth_flicker")
     rows = []
-    for variant, known in facts.beyond.items():
-        episodes = known.get("episodes", {})
-        named = ("boundary_F", "boundary_IoU", "flicker", "truth_flicker")
-        further = {name.lower(): known.get(name) for name in named}
+    for variant, mask in facts.beyond.items():
+        edges = {name.lower(): mask.get(name) for name in names}
+        episodes = mask.get("episodes", {})
         lasting = {"episodes": episodes.get("episodes"), "episode_seconds": episodes.get("seconds")}
-        rows.append({**key._asdict(), "variant": variant, **further, **lasting})
+        rows.append({**key._asdict(), "variant": variant, **edges, **lasting})
     return rows
 
 
@@ -198,7 +201,7 @@ def effect_rows(facts: Facts, key: Key) -> Iterator[dict[str, Any]]:
 def table_of(
     name: str, rows: Iterable[Mapping[str, Any]], tags: Iterable[str] = ()
 ) -> pd.DataFrame:
-    """Return rows as a table of drives, with its columns and their types; None is unknown."""
+    """Return a table of drives from its rows, with its columns and types; None is unknown."""
     import pandas as pd
 
     types = {c.name: TYPES[c.kind].replace("int", "Int") for c in TABLES[name].columns}
@@ -208,6 +211,6 @@ def table_of(
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a table as dictionaries; what is unknown is None."""
+    """Return the rows of a table as dictionaries; unknown values are None."""
     plain = table.astype(object)
     return plain.where(table.notna(), None).to_dict("records")  # type: ignore[return-value]

@@ -1,7 +1,7 @@
 """The tables of results: one schema for a drive, a rig and a fleet.
 
-Header, lines, types, the recording's headers and the documentation follow from here. Every row
-begins with its drive and camera, so that the tables of many drives are those of one, joined.
+Header, lines, types, the recording's headers and the documentation follow from it. Every row begins
+with its drive and camera, so tables of many drives are the concatenated tables of each.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Kind(StrEnum):
     TIME = "time"
     """Nanoseconds."""
     RATE = "rate"
-    """A fraction; empty where it is undefined."""
+    """A fraction; empty if it is undefined."""
     NUMBER = "number"
-    """Any other number; empty where it is undefined."""
+    """Any other number; empty if it is undefined."""
     FLAG = "flag"
     """True or false."""
 
@@ -39,7 +39,7 @@ class Kind(StrEnum):
 TYPES: Final = dict(
     zip(Kind, ("str", "str", "int64", "int64", "float64", "float64", "bool"), strict=True)
 )
-"""The type of each kind, as NumPy and Arrow call it."""
+"""The type of each kind, by its name in NumPy and Arrow."""
 
 
 class Column(NamedTuple):
@@ -58,7 +58,7 @@ class Column(NamedTuple):
 
 
 LATER: Final = ("truth",)
-"""Columns that the first results of this format lack: they hold 0 then, for unknown."""
+"""Columns that the first results of this format lack; they are read as 0, for unknown."""
 
 
 class TableSchema(NamedTuple):
@@ -68,7 +68,7 @@ class TableSchema(NamedTuple):
     doc: str
     """Describes a row."""
     columns: tuple[Column, ...]
-    """In the file's order."""
+    """The columns in the order of the file."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ class TableSchema(NamedTuple):
         return ",".join(self.names) + "\n"
 
     def arrow(self) -> pa.Schema:
-        """Return the columns with their Arrow types, those of a fleet included."""
+        """Return the columns with their Arrow types, including those of a fleet."""
         import pyarrow as pa
 
         return pa.schema([(c.name, TYPES[c.kind]) for c in (*self.columns, *self.of_a_fleet)])
@@ -98,10 +98,10 @@ UNSCORED: Final = "unscored"
 FAILED: Final = "failed"
 """The values of ``status`` in ``drives``."""
 TAG: Final = "tag_"
-"""Begins the name of a column of ``drives`` that holds a tag."""
+"""Prefix of a column of ``drives`` that holds a tag."""
 
 KEY: Final = (
-    Column("drive", Kind.TEXT, "the log's name; in a fleet, its own name there"),
+    Column("drive", Kind.TEXT, "name of the log; in a fleet, of the drive"),
     Column("camera", Kind.TEXT, "the image topic"),
 )
 """The first columns of every table."""
@@ -110,10 +110,10 @@ _IN_FRAME: Final = (
     Column("frame", Kind.COUNT, "position in the image topic by log time, from 0"),
 )
 _STAMP: Final = Column("stamp_ns", Kind.TIME, "header stamp")
-_VARIANT: Final = Column("variant", Kind.NAME, "whose mask; `blind` is the baseline")
-_STAGE: Final = Column("stage", Kind.NAME, "after which stage of the chain")
+_VARIANT: Final = Column("variant", Kind.NAME, "variant of the mask; `blind` is the baseline")
+_STAGE: Final = Column("stage", Kind.NAME, "stage of the chain that made the mask")
 _MASK: Final = (_VARIANT, _STAGE)
-_FINAL: Final = Column("final", Kind.FLAG, "whether that is the variant's last stage")
+_FINAL: Final = Column("final", Kind.FLAG, "whether it is the variant's last stage")
 _LABELLED: Final = Column("N", Kind.COUNT, "labelled pixels", "pixels")
 _COUNTS: Final = (
     Column("TP", Kind.COUNT, "road classified as road", "pixels"),
@@ -133,15 +133,15 @@ _MEANS: Final = (
 )
 _MEASURE: Final = (
     Column("measure", Kind.NAME, "`left_edge`, `right_edge`, `free_distance`, a rate"),
-    Column("where", Kind.NAME, "as `10m`, `ahead`, `0-10m`, `from_above`"),
+    Column("where", Kind.NAME, "place, as `10m`, `ahead`, `0-10m`, `from_above`"),
 )
-"""Measures of a camera that is known: metres to the left, or ahead, on flat ground."""
+"""Measures of a known camera: metres to the left, or ahead, on flat ground."""
 
 _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
     "frames": (
         *_IN_FRAME,
         _STAMP,
-        Column("log_time_ns", Kind.TIME, "when the recorder logged it"),
+        Column("log_time_ns", Kind.TIME, "time at which the recorder logged it"),
         *_MASK,
         *_COUNTS,
         *_RATES.values(),
@@ -163,8 +163,8 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
     ),
     "disagreements": (
         *_IN_FRAME,
-        Column("from_variant", Kind.NAME, "the first mask's"),
-        Column("to_variant", Kind.NAME, "the second mask's"),
+        Column("from_variant", Kind.NAME, "variant of the first mask"),
+        Column("to_variant", Kind.NAME, "variant of the second mask"),
         Column("repaired", Kind.COUNT, "pixels that only the second mask has right", "pixels"),
         Column("spoiled", Kind.COUNT, "pixels that only the first mask has right", "pixels"),
         _LABELLED,
@@ -174,15 +174,15 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         *_IN_FRAME,
         *_MASK,
         *_MEASURE,
-        Column("mask_m", Kind.NUMBER, "where the mask's road ends; empty if it does not", "m"),
-        Column("truth_m", Kind.NUMBER, "where the truth's does", "m"),
+        Column("mask_m", Kind.NUMBER, "end of the mask's road; empty if there is none", "m"),
+        Column("truth_m", Kind.NUMBER, "end of the truth's road", "m"),
     ),
 }
 
 _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
     "windows": (
         *KEY,
-        Column("window", Kind.COUNT, "from 0"),
+        Column("window", Kind.COUNT, "number of the window, from 0"),
         Column("first_frame", Kind.COUNT, "number of its first frame"),
         Column("last_frame", Kind.COUNT, "number of its last frame, inclusive"),
         Column("frames", Kind.COUNT, "evaluated frames that have this mask"),
@@ -191,9 +191,9 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
     ),
     "changes": (
         *KEY,
-        Column("from_variant", Kind.NAME, "the mask before: its variant"),
+        Column("from_variant", Kind.NAME, "variant of the mask before"),
         Column("from_stage", Kind.NAME, "and its stage"),
-        Column("to_variant", Kind.NAME, "the mask after: its variant"),
+        Column("to_variant", Kind.NAME, "variant of the mask after"),
         Column("to_stage", Kind.NAME, "and its stage"),
         Column("repaired", Kind.COUNT, "pixels of the drive that are wrong before only", "pixels"),
         Column("spoiled", Kind.COUNT, "pixels of the drive that are wrong after only", "pixels"),
@@ -202,12 +202,12 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
     "heat": (
         *KEY,
         _VARIANT,
-        Column("top", Kind.COUNT, "first row of the cell, in pixels", "pixels"),
+        Column("top", Kind.COUNT, "first row of the cell", "pixels"),
         Column("left", Kind.COUNT, "first column of the cell", "pixels"),
-        Column("side", Kind.COUNT, "of the cell, in pixels", "pixels"),
-        Column("labelled", Kind.COUNT, "how often a pixel of it was labelled"),
-        Column("FP", Kind.COUNT, "how often one was a false positive"),
-        Column("FN", Kind.COUNT, "how often one was a false negative"),
+        Column("side", Kind.COUNT, "side of the cell", "pixels"),
+        Column("labelled", Kind.COUNT, "number of times that one of its pixels was labelled"),
+        Column("FP", Kind.COUNT, "number of times that one was a false positive"),
+        Column("FN", Kind.COUNT, "number of times that one was a false negative"),
     ),
     "probabilities": (
         *KEY,
@@ -220,43 +220,43 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
         *KEY,
         _VARIANT,
         *_MEASURE,
-        Column("frames", Kind.COUNT, "evaluated frames on which the truth has it; 0 of a sum"),
-        Column("missing", Kind.COUNT, "of these, frames on which the mask has not"),
+        Column("frames", Kind.COUNT, "evaluated frames on which the truth has it; 0 for sums"),
+        Column("missing", Kind.COUNT, "number of these on which the mask has it not"),
         Column("value", Kind.NUMBER, "median of mask minus truth, outwards or ahead; or rate"),
         Column("p95", Kind.NUMBER, "95th percentile of the size of the difference"),
-        Column("low", Kind.NUMBER, "least value as the camera might stand"),
-        Column("high", Kind.NUMBER, "greatest value as it might stand"),
+        Column("low", Kind.NUMBER, "least value over stances of the camera"),
+        Column("high", Kind.NUMBER, "greatest value over stances of the camera"),
     ),
 }
 
 _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
     "drives": (
         *KEY,
-        Column("name", Kind.TEXT, "of its log, for people; two may have the same"),
+        Column("name", Kind.TEXT, "name of its log for people; two may have the same"),
         Column("source", Kind.TEXT, "path or URL of the log"),
-        Column("group", Kind.TEXT, "drives of one day or route share one"),
+        Column("group", Kind.TEXT, "name shared by drives of one day or route"),
         Column("fold", Kind.COUNT, "the fold whose model scored it; empty without folds"),
         Column(
             "status",
             Kind.NAME,
             "scored, damaged (scored but for what is lost), unscored (no truth), failed",
         ),
-        Column("exit_code", Kind.COUNT, "that `replay` of this drive alone ends with"),
-        Column("reason", Kind.TEXT, "why it was not scored"),
-        Column("seconds", Kind.NUMBER, "that the last attempt took", "s"),
-        Column("log_digest", Kind.NAME, "tells the log from another: of its index and checksums"),
+        Column("exit_code", Kind.COUNT, "exit code of `replay` on this drive alone"),
+        Column("reason", Kind.TEXT, "reason why it was not scored"),
+        Column("seconds", Kind.NUMBER, "time that the last attempt took", "s"),
+        Column("log_digest", Kind.NAME, "identity of the log, from its index and checksums"),
         Column("start_ns", Kind.TIME, "header stamp of the first evaluated frame"),
-        Column("end_ns", Kind.TIME, "of the last one"),
-        Column("rate_hz", Kind.NUMBER, "of the camera", "Hz"),
-        Column("width", Kind.COUNT, "of the frames, in pixels", "pixels"),
-        Column("height", Kind.COUNT, "of the frames, in pixels", "pixels"),
+        Column("end_ns", Kind.TIME, "header stamp of the last one"),
+        Column("rate_hz", Kind.NUMBER, "frame rate of the camera", "Hz"),
+        Column("width", Kind.COUNT, "width of the frames", "pixels"),
+        Column("height", Kind.COUNT, "height of the frames", "pixels"),
         Column("in_log", Kind.COUNT, "frames of the camera's topic"),
         Column("read", Kind.COUNT, "frames that were read"),
         Column("decoded", Kind.COUNT, "frames that could be decoded"),
         Column("labelled", Kind.COUNT, "frames that have a truth"),
         Column("trained_on", Kind.COUNT, "frames left out because a model learnt from them"),
         Column("evaluated", Kind.COUNT, "frames that were scored"),
-        Column("losses", Kind.TEXT, "what was lost of the log, a sentence a line"),
+        Column("losses", Kind.TEXT, "losses of the log, a sentence a line"),
         Column("warnings", Kind.TEXT, "warnings, a sentence a line"),
         Column(
             "misfits", Kind.TEXT, "truth or masks that do not fit the images, a sentence a line"
@@ -268,16 +268,16 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         *KEY,
         *_MASK,
         _FINAL,
-        Column("region", Kind.NAME, "the pixels that are counted; `all` is every one"),
+        Column("region", Kind.NAME, "the pixels that are counted; `all` is the whole frame"),
         Column("frames", Kind.COUNT, "evaluated frames that have this mask and region"),
         *_COUNTS,
         *_MEANS,
         Column("boundary_f", Kind.RATE, "mean boundary F of the final mask"),
         Column("boundary_iou", Kind.RATE, "mean boundary IoU of the final mask"),
         Column("episodes", Kind.COUNT, "stretches of frames with an ERR of 15 % or more"),
-        Column("episode_seconds", Kind.NUMBER, "how long these are, in all", "s"),
+        Column("episode_seconds", Kind.NUMBER, "their total length", "s"),
         Column("flicker", Kind.RATE, "share of pixels that change from frame to frame"),
-        Column("truth_flicker", Kind.RATE, "the same of the truth"),
+        Column("truth_flicker", Kind.RATE, "share of pixels that change in the truth"),
     ),
     "effects": (
         *KEY,
@@ -285,13 +285,15 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         *_MASK,
         _FINAL,
         Column("metric", Kind.NAME, "the rate"),
-        Column("mean", Kind.RATE, "of the frames' differences"),
-        Column("standard_error", Kind.NUMBER, "of that, as frames of a drive are alike"),
+        Column("mean", Kind.RATE, "mean of the frames' differences"),
+        Column(
+            "standard_error", Kind.NUMBER, "standard error of the mean; allows for alike frames"
+        ),
         Column("low", Kind.RATE, "lower end of its interval"),
         Column("high", Kind.RATE, "upper end"),
         Column("p", Kind.RATE, "p-value of no difference"),
         Column("frames", Kind.COUNT, "frames that have a difference"),
-        Column("effective_frames", Kind.NUMBER, "independent frames that tell as much"),
+        Column("effective_frames", Kind.NUMBER, "number of independent frames that tell as much"),
         Column("worse", Kind.COUNT, "frames on which it is worse than the base"),
         Column("better", Kind.COUNT, "frames on which it is better"),
     ),
@@ -303,7 +305,7 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         _RATES["ERR"],
         _RATES["FNR"],
         _RATES["FPR"],
-        Column("picture", Kind.TEXT, "its file in the fleet's folder, errors in colour"),
+        Column("picture", Kind.TEXT, "picture of the errors: a file in the fleet's folder"),
     ),
 }
 
@@ -322,9 +324,9 @@ _ROWS: Final = {
     "drives": "A row per drive and camera, scored or not; a column `tag_<key>` for each tag.",
     "scores": "A row per drive, camera, variant, stage and region.",
     "effects": "A row per drive, camera, difference between two masks, and rate.",
-    "worst": "A row per frame among the worst of all, by ERR of the first variant's final mask.",
+    "worst": "A row per frame among the worst of all, by ERR of the final mask of the focus.",
 }
-"""What a row of each table is."""
+"""The meaning of a row of each table."""
 TABLES: Final[Mapping[str, TableSchema]] = {
     name: TableSchema(name, _ROWS[name], columns)
     for name, columns in (_OF_FRAMES | _OF_SUMS | _OF_DRIVES).items()
@@ -339,7 +341,7 @@ OF_DRIVES: Final = (*_OF_DRIVES,)
 
 
 def documentation(tables: Iterable[str], ending: str) -> str:
-    """Return tables and their columns as Markdown, as files with this ending."""
+    """Return the documentation of tables in files of an ending, in Markdown."""
     parts = []
     for table in (TABLES[name] for name in tables):
         columns = (*table.columns, *(table.of_a_fleet if ending == "parquet" else ()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from io import BytesIO
@@ -27,13 +27,15 @@ if TYPE_CHECKING:
 NAMED: Final = 40
 """Letters of a wrong name that a message quotes."""
 ROWS: Final = 10_000
-"""Rows that a file of any size may have; a larger one has at least a byte for each."""
+"""Rows that a Parquet file of any size may have; more rows need at least a byte each."""
 UNPACKED: Final = 256 << 20
+"""Bytes that a Parquet file of any size may unpack to; a larger file may to 100 times its size."""
 COLUMNS: Final = 1_000
 WORDS: Final = 1_000
 """Different words in a column of a drive's table: variants, stages, regions."""
 FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 3}
-"""Of a fleet's folder and its tables; the version rises where a column changes its meaning."""
+"""Format of a fleet's folder and its tables; a column that changes its meaning raises the version.
+"""
 AGAIN: Final = "run the fleet's command again"
 _ANEW: Final = "make the results again with roadeval replay"
 
@@ -44,7 +46,7 @@ class ResultsError(RoadevalError):
 
 @dataclass(frozen=True)
 class TableFacts:
-    """The rows of a table, and the SHA-256 of its text."""
+    """The number of rows of a table, and the SHA-256 of its text."""
 
     rows: int
     sha256: str
@@ -53,15 +55,14 @@ class TableFacts:
 def read_table(
     name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None, camera: str = ""
 ) -> pd.DataFrame:
-    """Read a table of a drive bit-exactly, and check that it is whole.
+    """Read a table of a drive bit-exactly, and check that it is complete.
 
-    A `ResultsError` if the table is damaged, or is not the one that the summary states. ``name`` is
-    one of `roadeval.results.schema.TABLES`; ``source`` a CSV file, or its text with the header
-    line. A file that does not exist has no rows, like an empty text. ``stated`` are the number of
-    rows and the SHA-256 that the summary states of each table, by name: one that it does not state
-    must be empty. It is None where there is no summary. With ``camera`` only the rows of that
-    camera are returned. Names are categoricals of text, even if they look like numbers; rates are
-    float64, all other numbers int64.
+    ``name`` is one of `roadeval.results.schema.TABLES`; ``source`` is a CSV file, or its text with
+    the header line. A file that does not exist has no rows, like an empty text. ``stated`` are the
+    facts that the summary states of each table, by name: a table that it does not state must be
+    empty. It is None if there is no summary. With ``camera`` only the rows of that camera are
+    returned. Names are categoricals of text, even if they look like numbers; rates are float64, all
+    other numbers int64. A `ResultsError` if the table is damaged, or not the one that is stated.
     """
     table = TABLES[name]
     where = source if isinstance(source, Path) else f"the recording's table {name}"
@@ -74,38 +75,35 @@ def read_table(
     except OSError as error:
         raise ResultsError(f"{where}: {error.strerror}") from error
     if stated is not None:
-        _check(where, content, stated.get(name))
-    if not content:
-        content = table.header.encode()
+        _check_stated(where, content, stated.get(name))
+    lines = content.splitlines() if stated is None else []
     try:
-        if stated is None:
-            lines = content.splitlines()
-            if len({*lines}) < len(lines):
-                raise ValueError("a row is there twice")
-        rows: pd.DataFrame = _parsed(content, table).to_pandas()
+        if len({*lines}) < len(lines):
+            raise ValueError("a row is there twice")
+        rows: pd.DataFrame = _parse_csv(content or table.header.encode(), table).to_pandas()
     except ValueError as error:  # Arrow's too
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
     return rows[rows["camera"] == camera] if camera else rows
 
 
-def _check(where: Path | str, content: bytes, stated: TableFacts | None) -> None:
+def _check_stated(where: Path | str, content: bytes, stated: TableFacts | None) -> None:
     rows = max(content.count(b"\n") - 1, 0)
-    found = TableFacts(rows, hashlib.sha256(content).hexdigest())
-    if found == stated or (stated is None and not rows):
+    actual = TableFacts(rows, hashlib.sha256(content).hexdigest())
+    if actual == stated or (stated is None and not rows):
         return
-    wanted = stated.rows if stated else 0
-    if rows != wanted and isinstance(where, str):
+    stated_rows = stated.rows if stated else 0
+    if rows != stated_rows and isinstance(where, str):
         raise ResultsError(
             f"{where}: it is a part, or several runs in one, as `rerun rrd` splits and merges them "
-            f"({rows} of {wanted} rows); give the recording as it was made"
+            f"({rows} of {stated_rows} rows); give the recording as it was made"
         )
-    difference = "its content differs" if rows == wanted else f"{rows} of {wanted} rows"
+    difference = "its content differs" if rows == stated_rows else f"{rows} of {stated_rows} rows"
     raise ResultsError(f"{where}: does not agree with its summary ({difference}); {_ANEW}")
 
 
-def _parsed(content: bytes, table: TableSchema) -> pa.Table:
-    """Parse CSV; a ValueError says what is wrong with it."""
+def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
+    """Parse CSV and check it; a ValueError tells what is wrong with it."""
     import pyarrow as pa
     from pyarrow import csv
 
@@ -115,39 +113,50 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     parsed = csv.read_csv(BytesIO(content), convert_options=options)
     if not content.endswith(b"\n"):
         raise ValueError("its last line is cut off")
-    if len({*parsed.column_names}) < len(parsed.column_names):
-        raise ValueError("a column is there twice")
     for name in sorted({*table.names} & {*LATER} - {*parsed.column_names}):
         parsed = parsed.append_column(name, pa.array(np.zeros(len(parsed), np.int64)))
-    if missing := [name for name in table.names if name not in parsed.column_names]:
-        raise ValueError(f"no column {', '.join(missing)}")
+    complete = [c.name for c in table.columns if c.kind not in (Kind.RATE, Kind.NUMBER)]
+    _check_columns(parsed, table.columns, complete)
     parsed = parsed.unify_dictionaries()
-    for column in table.columns:
-        if column.kind not in (Kind.RATE, Kind.NUMBER):
-            _check_cells(column, parsed[column.name])
+    for column in (column for column in table.columns if column.is_word):
+        names = _words_of(parsed[column.name])
+        if len(names) > WORDS:
+            raise ValueError(f"column {column.name} holds {len(names):,} different words")
+        check_texts(names)
+        for name in names if column.kind is Kind.NAME else ():
+            if not is_plain(name):
+                raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
     return parsed
 
 
-def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
-    """Refuse, as a ValueError, a column that lacks a value, or a name that is none."""
-    if cells.null_count:
-        raise ValueError(f"column {column.name} lacks a value")
-    if not column.is_word:
-        return
-    words = {word for chunk in cells.chunks for word in chunk.dictionary.to_pylist()}
-    if len(words) > WORDS:
-        raise ValueError(f"column {column.name} holds {len(words):,} different words")
-    check_texts(words)
-    for name in words if column.kind is Kind.NAME else ():
-        if not is_plain(name):
-            raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
+def _check_columns(table: pa.Table, columns: Sequence[Column], complete: Container[str]) -> None:
+    """Raise a ValueError unless a table has all columns, and values in the ``complete`` ones."""
+    import pyarrow as pa
+
+    if len({*table.column_names}) < len(table.column_names):
+        raise ValueError("a column is there twice")
+    if missing := [column.name for column in columns if column.name not in table.column_names]:
+        raise ValueError(f"no column {', '.join(missing)}")
+    for name, cells, kind in ((c.name, table[c.name], c.kind) for c in columns):
+        expected = pa.type_for_alias(TYPES[kind])
+        is_dictionary = pa.types.is_dictionary(cells.type)
+        if (cells.type.value_type if is_dictionary else cells.type) != expected:
+            raise ValueError(f"column {name} is not of type {expected}")
+        if cells.null_count and name in complete:
+            raise ValueError(f"column {name} lacks a value")
+
+
+def _words_of(cells: pa.ChunkedArray) -> list[str]:
+    """Return the words of a column whose chunks share a dictionary."""
+    words: list[str] = cells.chunk(0).dictionary.to_pylist() if cells.num_chunks else []
+    return words
 
 
 def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str = "") -> None:
-    """Write tables of a fleet, given by their files; all are whole before one takes its name.
+    """Write tables of a fleet, all of them before the first one takes its name.
 
-    Of each its name and its rows are given; NaN is no value. ``made_of`` is the SHA-256 of what
-    they were made of. An OSError if one cannot be written.
+    ``tables`` has the name and the rows of each file; NaN is no value. ``made_of`` is the SHA-256
+    of the summary that they were made of. An OSError if one cannot be written.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -176,7 +185,7 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str 
 
 
 def made_of(path: Path) -> str:
-    """Return of what a table was made, as it was written; empty where it cannot be read."""
+    """Return the digest of what a table was made of; empty if it cannot be read."""
     from pyarrow import ArrowException, parquet
 
     try:
@@ -187,80 +196,63 @@ def made_of(path: Path) -> str:
 
 
 def read_parquet(paths: Sequence[Path], name: str) -> pd.DataFrame:
-    """Read a table of a fleet's folder from its files, which others may have damaged.
+    """Read a table of a fleet's folder from its files, one below the other.
 
-    A `ResultsError` if one is not there, cannot be read, or lacks a column, or one is of another
-    type.
+    A `ResultsError` if one is missing or damaged, or has not the columns that it must have.
     """
     import pandas as pd
     import pyarrow as pa
 
-    schema = TABLES[name].arrow()
-    parts = [_checked(path, name) for path in paths] or [schema.empty_table()]
-    table = pa.concat_tables(parts)
-    rows: pd.DataFrame = table.unify_dictionaries().to_pandas(
-        types_mapper={pa.int64(): pd.Int64Dtype()}.get
-    )
+    try:
+        table = _read_files(paths, TABLES[name])
+    except FileNotFoundError as error:
+        raise ResultsError(f"{error.filename}: is not there; {AGAIN}") from None
+    except (OSError, ValueError, pa.ArrowException) as error:
+        for path in paths if len(paths) > 1 else ():
+            read_parquet([path], name)  # the damaged one is named
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
+    rows: pd.DataFrame = table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
     counts = [n for n in rows if rows[n].dtype == "Int64" and not rows[n].hasnans]
     return rows.astype(dict.fromkeys(counts, np.int64))
 
 
-def _checked(path: Path, name: str) -> pa.Table:
-    """Read a file of a table, words as dictionaries."""
+def _read_files(paths: Sequence[Path], table: TableSchema) -> pa.Table:
+    """Read files of a table and check them; a ValueError tells what is wrong with them."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    schema = TABLES[name].arrow()
-    try:
+    columns = (*table.columns, *table.of_a_fleet)
+    words = [column.name for column in columns if column.is_word]
+    parts = []
+    for path in paths:
         check_input(path)
         metadata = parquet.read_metadata(path)
         _check_size(metadata, path.stat().st_size)
-        there = {*metadata.schema.names}
-        words = [f.name for f in schema if f.name in there and f.type == pa.string()]
         # As one file: of a path with "drive=" in it a column would be made.
         with parquet.ParquetFile(
             path, metadata=metadata, read_dictionary=words, page_checksum_verification=True
         ) as file:
-            table = file.read()
-        _check_columns(table, name)
-        for chunk in (chunk for word in words for chunk in table[word].chunks):
-            texts = chunk.dictionary.to_pylist()
-            if any(len(text) > LONG for text in texts):  # many rows may have one
-                check_texts(texts[row] for row in chunk.indices.drop_null().to_pylist())
-        for drive in table["drive"].unique().to_pylist():  # files are called after drives
-            if drive is None or not is_plain(drive):
-                raise ValueError(f"a drive is called {str(drive)[:NAMED]!r}, which is no name")
-    except FileNotFoundError:
-        raise ResultsError(f"{path}: is not there; {AGAIN}") from None
-    except (OSError, ValueError, pa.ArrowException) as error:
-        reason = str(error).partition("\n")[0]
-        raise ResultsError(f"{path}: damaged ({reason}); {AGAIN}") from error
-    columns = table.column_names if name == "drives" else ()
-    tags = [column for column in columns if column.startswith(TAG)]
-    return table.select([*schema.names, *tags])
-
-
-def _check_columns(table: pa.Table, name: str) -> None:
-    """Refuse, as a ValueError, a table that lacks a column, or a word, or has another type."""
-    import pyarrow as pa
-
-    if len({*table.column_names}) < len(table.column_names):
-        raise ValueError("a column is there twice")
-    for column in TABLES[name].arrow():
-        if column.name not in table.column_names:
-            raise ValueError(f"no column {column.name}")
-        kind = table.schema.field(column.name).type
-        if (kind.value_type if pa.types.is_dictionary(kind) else kind) != column.type:
-            raise ValueError(f"column {column.name} is not of type {column.type}")
-        needed = name != "drives" or column.name in ("drive", "name", "status")
-        if needed and column.type == pa.string() and table[column.name].null_count:
-            raise ValueError(f"column {column.name} lacks a value")
+            parts.append(file.read(use_threads=False))
+    rows = pa.concat_tables(parts or [table.arrow().empty_table()]).unify_dictionaries()
+    of_drives = table.name == "drives"
+    _check_columns(rows, columns, ("drive", "name", "status") if of_drives else words)
+    for cells in (rows[word] for word in words if pa.types.is_dictionary(rows[word].type)):
+        texts = _words_of(cells)
+        if any(len(text) > LONG for text in texts):  # many rows may have one
+            codes = cells.combine_chunks().indices.drop_null().to_pylist()
+            check_texts(texts[code] for code in codes)
+    for drive in rows["drive"].unique().to_pylist():  # files are called after drives
+        if not is_plain(drive):
+            raise ValueError(f"a drive is called {drive[:NAMED]!r}, which is no name")
+    tags = [name for name in rows.column_names if of_drives and name.startswith(TAG)]
+    return rows.select([*(column.name for column in columns), *tags])
 
 
 def _check_size(metadata: parquet.FileMetaData, size: int) -> None:
-    """Refuse, as a ValueError, a small file that would fill the memory."""
-    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
-    unpacked = sum(each.total_byte_size for each in groups)
+    """Raise a ValueError for a small file that would fill the memory."""
+    groups = (metadata.row_group(place) for place in range(metadata.num_row_groups))
+    unpacked = sum(group.total_byte_size for group in groups)
     if metadata.num_rows > ROWS + size or unpacked > UNPACKED + 100 * size:
         raise ValueError(
             f"{size:,} bytes that unpack to {metadata.num_rows:,} rows and {unpacked:,} bytes"

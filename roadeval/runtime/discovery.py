@@ -1,4 +1,4 @@
-"""What the modules of a folder define, so that one file adds one thing."""
+"""Definitions collected from the modules of a folder, so that one file adds one thing."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def by_name(things: Iterable[Any]) -> dict[str, Any]:
     return named
 
 
-def found_in(package: ModuleType, name: str) -> tuple[Any, ...]:
-    """Return what the modules of a package call ``name``, in the order of the modules' names.
+def collect(package: ModuleType, name: str) -> tuple[Any, ...]:
+    """Return the objects called ``name`` in the modules of a package, sorted by module.
 
-    Modules without the name, and those whose own name begins with ``_``, are left out.
+    Modules without such an object, or with a name that begins with ``_``, are left out.
     """
     names = sorted(module.name for module in iter_modules(package.__path__))
-    modules = [import_module(f"{package.__name__}.{each}") for each in names if each[0] != "_"]
+    modules = [import_module(f"{package.__name__}.{file}") for file in names if file[0] != "_"]
     return tuple(getattr(module, name) for module in modules if hasattr(module, name))

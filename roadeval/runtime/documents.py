@@ -1,7 +1,7 @@
 """JSON, TOML, YAML and Protocol Buffers from elsewhere, read within limits.
 
-A few kilobytes can nest deeper than any program unpacks, name a table by twenty thousand words, or
-hold a word that takes minutes to typeset.
+A few kilobytes can nest too deep for any program, hold a name of twenty thousand words, or a word
+that takes minutes to typeset.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from typing import Any, Final
 from roadeval.runtime.files import check_input
 
 LONGEST: Final = 12_000
-"""Letters of a text."""
+"""Greatest number of letters of a text."""
 LONG: Final = 1_000
 LONG_TOGETHER: Final = 500_000
-"""Letters of all texts of more than `LONG` letters."""
+"""Greatest number of letters of all texts of more than `LONG` letters together."""
 LISTED: Final = 1_000_000
-"""Letters of the texts of a list."""
+"""Greatest number of letters of the texts of a list."""
 VALUES: Final = 2_000_000
 DEPTH: Final = 32
-"""Tables and lists inside one another."""
+"""Greatest number of tables and lists inside one another."""
 _TOO_MANY: Final = "it holds more than {:,} values"
 _TOO_DEEP: Final = f"it nests more than {DEPTH} tables and lists inside one another"
 BYTES: Final = 64 << 20
 TOML_BYTES: Final = 1 << 20
 YAML_BYTES: Final = 1 << 17
 DOTS: Final = 2_000
-"""Parts of a name in TOML; the time to read one grows with the square of their number."""
+"""Greatest number of parts of a name in TOML; the time to read it grows with their square."""
 
 
 def read_bounded(path: Path, most: int = BYTES) -> bytes:
@@ -49,13 +49,13 @@ def read_json(
 ) -> Any:
     """Read a JSON document; a ValueError if it is damaged or beyond a limit.
 
-    The lengths of texts have a limit only where these may be ``shown``.
+    The lengths of texts have a limit only if they may be ``shown``.
     """
     _check_size(len(content), most)
     marks = ",[{" if isinstance(content, str) else (b",", b"[", b"{")
     if sum(map(content.count, marks)) > 2 * values:  # type: ignore[arg-type]
         raise ValueError(_TOO_MANY.format(values))
-    with _in_words():
+    with explaining():
         document = json.loads(content)
     _check(document, values, shown=shown)
     return document
@@ -66,7 +66,7 @@ def read_toml(text: str) -> dict[str, Any]:
     _check_size(len(text), TOML_BYTES)
     if sum(line.count(".") ** 2 for line in text.splitlines()) > DOTS**2:
         raise ValueError(f"a name in it has more than {DOTS:,} parts, or several have so many")
-    with _in_words():
+    with explaining():
         document = tomllib.loads(text)
     _check(document, VALUES)
     return document
@@ -78,18 +78,18 @@ def read_yaml(path: Path) -> Any:
 
     text, depth = read_bounded(path, YAML_BYTES), 0
     try:
-        with _in_words():
+        with explaining():
             for token in yaml.scan(text):
                 if isinstance(token, yaml.AliasToken):
                     raise ValueError("it has aliases, as *name: write them out")
-                # PyYAML would take a minute for brackets that open and never close.
+                # PyYAML takes a minute for brackets that open and never close.
                 kind = type(token).__name__
                 depth += kind.endswith(("SequenceStartToken", "MappingStartToken"))
                 depth -= kind.endswith("EndToken") and not kind.startswith("Stream")
                 if depth > DEPTH:
                     raise RecursionError
             document = yaml.safe_load(text)
-    # PyYAML raises any of these for a value that its tag does not fit.
+    # PyYAML raises any of these for a value that does not fit its tag.
     except (yaml.YAMLError, AttributeError, LookupError) as error:
         raise ValueError("it is damaged") from error
     _check(document, VALUES)
@@ -97,7 +97,7 @@ def read_yaml(path: Path) -> Any:
 
 
 @contextmanager
-def _in_words() -> Iterator[None]:
+def explaining() -> Iterator[None]:
     """Turn the errors of a parser into a ValueError in plain words."""
     try:
         yield
@@ -115,7 +115,7 @@ def _in_words() -> Iterator[None]:
 
 
 def check_texts(texts: Iterable[str]) -> None:
-    """Raise a ValueError for texts that would take too long to show."""
+    """Raise a ValueError for texts that take too long to show."""
     together = 0
     for text in (line for lines in texts if len(lines) > LONG for line in lines.split("\n")):
         if len(text) > LONGEST:
@@ -133,7 +133,7 @@ def _check_size(size: int, most: int) -> None:
 
 
 def _check(document: Any, most: int, *, shown: bool = True) -> None:
-    """Raise a ValueError for a document that is too deep, too large or too long to be shown."""
+    """Raise a ValueError for a document that is too deep, too large or too long to show."""
     texts: list[str] = []
     level, depth, values = [document], 0, 0
     while level:
@@ -160,8 +160,7 @@ def _check(document: Any, most: int, *, shown: bool = True) -> None:
 def protobuf_fields(message: memoryview) -> Iterator[tuple[int, Any]]:
     """Yield number and value of each field of a message in Protocol Buffers.
 
-    A value is an integer, or the part of the message that holds it. A ValueError if the message is
-    damaged.
+    A value is an integer, or a part of the message. A ValueError if the message is damaged.
     """
     place = 0
     while place < len(message):
@@ -173,8 +172,8 @@ def protobuf_fields(message: memoryview) -> Iterator[tuple[int, Any]]:
             continue
         if kind == 2:
             size, place = _varint(message, place)
-        elif kind in _SIZES:
-            size = _SIZES[kind]
+        elif kind in (1, 5):
+            size = 8 if kind == 1 else 4
         else:
             raise ValueError("a kind of field that is not used")
         if size > len(message) - place:
@@ -183,12 +182,8 @@ def protobuf_fields(message: memoryview) -> Iterator[tuple[int, Any]]:
         place += size
 
 
-_SIZES: Final = {1: 8, 5: 4}
-"""Bytes of fields of a fixed size, by their kind."""
-
-
 def _varint(message: memoryview, place: int) -> tuple[int, int]:
-    """Return an integer, seven bits a byte, and the place behind it."""
+    """Return an integer, seven bits per byte, and the place after it."""
     value = 0
     for index, byte in enumerate(message[place : place + 10]):
         value |= (byte & 0x7F) << (7 * index)

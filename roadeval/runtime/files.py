@@ -1,8 +1,8 @@
 """Files and folders that are replaced as one, by one run at a time.
 
-Each is written under a name of its own and takes its place when it is complete, so a file with an
-output's name is whole. A run claims its outputs before it computes; what killed runs have left of
-an output is removed then.
+Each is written under a name of its own and takes its place when it is complete, so that a file with
+an output's name is complete. A run claims its outputs before it computes, and removes what killed
+runs have left of them.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Paths = AnyPath | Sequence[AnyPath]
 """One path, or some."""
 
 _MOVING: Final = "-moving"
-"""Ends the name of a complete folder while its files are moved into the one that it replaces."""
+"""End of a complete folder's name while its files are moved into the folder that it replaces."""
 _REPLACED: Final = ".replaced"
-"""The name of the old folder's seal in such a folder."""
+"""Name of the old folder's seal in such a folder."""
 _PATIENCE_S: Final = 0.2
 """Time between two attempts to claim an output."""
 
@@ -45,7 +45,7 @@ _KINDS: Final = {
 }
 
 
-def listed(paths: Paths) -> list[AnyPath]:
+def list_paths(paths: Paths) -> list[AnyPath]:
     """Return one path or some as a list; a text is a path, not a sequence of letters."""
     return [paths] if isinstance(paths, str | Path) else list(paths)
 
@@ -63,8 +63,8 @@ def writing(place: object, kind: type[Exception], advice: str = "") -> Iterator[
 def check_input(path: str | Path) -> None:
     """Raise an OSError if a path does not lead to a file that can be read from begin to end.
 
-    A pipe may never give anything, and a device may never end. A pointer of Git LFS stands for a
-    file that is elsewhere.
+    A pipe may never give a byte, a device may never end, and a pointer of Git LFS stands for a file
+    that is elsewhere.
     """
     _check_kind(Path(path), "a file", "")
     with Path(path).open("rb") as file:
@@ -77,21 +77,21 @@ def check_output(path: Path, *, folder: bool = False) -> None:
     with suppress(FileNotFoundError):
         _check_kind(path, "a folder" if folder else "a file", "; name another")
     with suppress(FileNotFoundError):
-        own_name(path).lstat()  # it is longer, and may be too long
+        partial_name(path).lstat()  # it is longer, and may be too long
 
 
-def _check_kind(path: Path, wanted: str, advice: str) -> None:
+def _check_kind(path: Path, expected: str, advice: str) -> None:
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "its name has a null character", str(path))
     mode = stat.S_IFMT(path.stat().st_mode)
     kind = _KINDS.get(mode, "a device")
-    if kind != wanted:
+    if kind != expected:
         number = errno.EISDIR if mode == stat.S_IFDIR else errno.ENOTSUP
-        raise OSError(number, f"is {kind}, not {wanted}{advice}", str(path))
+        raise OSError(number, f"is {kind}, not {expected}{advice}", str(path))
 
 
-def own_name(path: Path, *, hidden: bool = True) -> Path:
-    """Return a unique name beside an output's, for what is not complete yet.
+def partial_name(path: Path, *, hidden: bool = True) -> Path:
+    """Return a unique name beside an output's, for a file that is not complete yet.
 
     ``out.rrd`` may become ``.out.5d1c02fe.partial.rrd``.
     """
@@ -99,16 +99,16 @@ def own_name(path: Path, *, hidden: bool = True) -> Path:
     return path.parent / f"{dot}{path.stem}.{secrets.token_hex(4)}.partial{path.suffix}"
 
 
-def own_names(path: Path, *, hidden: bool = True) -> list[Path]:
-    """List the files and folders with an `own_name` of an output, the newest last.
+def find_partial(path: Path, *, hidden: bool = True) -> list[Path]:
+    """List the files and folders with a `partial_name` of an output, the newest last.
 
     A name may end in a hyphen and a word.
     """
     dot, stem, suffix = r"\." if hidden else "", re.escape(path.stem), re.escape(path.suffix)
     pattern = re.compile(rf"{dot}{stem}\.[0-9a-f]{{8}}\.partial{suffix}(-\w+)?")
-    there = path.parent.iterdir() if path.parent.is_dir() else ()
-    found = [each for each in there if pattern.fullmatch(each.name)]
-    return sorted(found, key=lambda each: each.lstat().st_mtime_ns)
+    entries = path.parent.iterdir() if path.parent.is_dir() else ()
+    partial = [entry for entry in entries if pattern.fullmatch(entry.name)]
+    return sorted(partial, key=lambda entry: entry.lstat().st_mtime_ns)
 
 
 def sha256_of(path: Path) -> str:
@@ -123,12 +123,12 @@ def leads_outside(path: Path, folder: Path) -> bool:
 
 
 def target_of(path: Path) -> Path:
-    """Return where a link leads; any other path as it is."""
+    """Return the target of a link; any other path unchanged."""
     return Path(os.path.realpath(path)) if os.path.islink(path) else path  # noqa: PTH114
 
 
 def remove(path: Path) -> None:
-    """Remove a file or folder, if that is possible; what is left is only clutter."""
+    """Remove a file or folder if that is possible; an error leaves only clutter."""
     with suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
@@ -139,12 +139,12 @@ def remove(path: Path) -> None:
 class NewFile:
     """A file that is written as ``partial`` and takes its place when it is complete.
 
-    Where ``path`` is a link, its target is replaced.
+    If ``path`` is a link, its target is replaced.
     """
 
     def __init__(self, path: Path, *, hidden: bool = True) -> None:
         self._target: Final = target_of(path)
-        self.partial: Final = own_name(self._target, hidden=hidden)
+        self.partial: Final = partial_name(self._target, hidden=hidden)
 
     def begin(self) -> None:
         """Make its folder; an OSError if that fails, or no file can have its name."""
@@ -176,17 +176,17 @@ class Content:
     """The files of a folder that are replaced; all others stay."""
 
     seal: str
-    """The file that makes the folder a whole result."""
+    """Name of the file that makes the folder a complete result."""
     names: Callable[[Path], frozenset[str]]
-    """Reads the names of the files from a seal, which may be missing."""
+    """A function that reads the names of the files from a seal, which may be missing."""
 
 
 class NewFolder:
     """A folder that is written as ``partial``, and whose files take their places together.
 
-    It is written inside the folder of its name. Then the old seal is removed first, and the new one
-    moved last; `claimed_folder` completes what a killed run had begun. Where ``path`` is a link,
-    the folder behind it is written; ``content`` says what is replaced in it.
+    It is written inside the folder with its name. Then the old seal is removed first, and the new
+    one moved last; `claimed_folder` completes the moves of a killed run. If ``path`` is a link, the
+    folder behind it is written; ``content`` lists the files that are replaced.
     """
 
     def __init__(self, path: Path, content: Content) -> None:
@@ -194,7 +194,7 @@ class NewFolder:
         self._content: Final = content
         self._target: Final = Path(os.path.realpath(path))
         self._is_new: Final = not self._target.exists()
-        self.partial: Final = own_name(self._target / self._target.name)
+        self.partial: Final = partial_name(self._target / self._target.name)
 
     def begin(self) -> None:
         """Make it, empty; an OSError if that fails, or no folder can have its name."""
@@ -206,13 +206,13 @@ class NewFolder:
 
         After an OSError the old content is there, or the next `claimed_folder` completes the new.
         """
-        for each in self.partial.iterdir():
-            if (self._target / each.name).is_dir():
-                raise IsADirectoryError(errno.EISDIR, "is a folder", str(self._target / each.name))
+        for file in self.partial.iterdir():
+            if (self._target / file.name).is_dir():
+                raise IsADirectoryError(errno.EISDIR, "is a folder", str(self._target / file.name))
         _settle(self.partial.rename(f"{self.partial}{_MOVING}"), self._content)
 
     def discard(self) -> None:
-        """Remove the partial folder, and the empty one that was made for it, if there are such."""
+        """Remove the partial folder, and the empty folder that was made for it, if any."""
         remove(self.partial)
         if self._is_new:
             with suppress(OSError):
@@ -223,16 +223,16 @@ def _settle(moving: Path, content: Content) -> None:
     """Move the files of a complete folder into its parent; after a kill, the remaining ones."""
     target, seal, replaced = moving.parent, moving / content.seal, moving / _REPLACED
     if seal.exists():
-        with suppress(FileNotFoundError):  # without an old seal all files there are of others
+        with suppress(FileNotFoundError):  # without an old seal no file there is this output's
             (target / content.seal).replace(replaced)
         if replaced.exists():
             for name in content.names(replaced):
                 if not (target / name).is_dir():
                     (target / name).unlink(missing_ok=True)
             replaced.unlink()
-        for each in moving.iterdir():
-            if each != seal:
-                each.replace(target / each.name)
+        for file in moving.iterdir():
+            if file != seal:
+                file.replace(target / file.name)
         seal.replace(target / content.seal)
     remove(moving)
 
@@ -245,8 +245,8 @@ def claimed_file(path: Path, *, wait: bool = False) -> Iterator[bool]:
     """
     check_output(path)
     target = target_of(path)
-    with _made(target.parent), claimed(target, target.parent, wait=wait) as certain:
-        for left in own_names(target) if certain else ():
+    with new_folder(target.parent), claimed(target, target.parent, wait=wait) as certain:
+        for left in find_partial(target) if certain else ():
             remove(left)
         yield certain
 
@@ -264,12 +264,12 @@ def alone(*paths: Path) -> Iterator[None]:
 def claimed_folder(path: Path, content: Content) -> Iterator[bool]:
     """Hold the claim on a folder to be replaced, as `claimed_file` does on a file.
 
-    Files that a killed run had begun to move are moved.
+    The moves that a killed run had begun are completed.
     """
     check_output(path, folder=True)
     target = Path(os.path.realpath(path))
-    with _made(target), claimed(target, target) as certain:
-        for left in own_names(target / target.name) if certain else ():
+    with new_folder(target), claimed(target, target) as certain:
+        for left in find_partial(target / target.name) if certain else ():
             _settle(left, content) if left.name.endswith(_MOVING) else remove(left)
         yield certain
 
@@ -281,11 +281,11 @@ def claimed(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
     The lock ends with the process. All runs that write the output name the same folder. While
     another run has the claim, wait, or raise a BlockingIOError that names the run.
 
-    Yields whether it is certain that no other run has it: False where the system or the disk has no
-    locks. The library ``filelock`` names no owner of a lock, and leaves its files behind.
+    Yields whether it is certain that no other run has the claim: False if the system or the disk
+    has no locks. The library ``filelock`` names no owner of a lock, and leaves its files behind.
     """
     name = home / f".{path.name}.lock"
-    file, certain = _locked(name, wait=wait)
+    file, certain = open_locked(name, wait=wait)
     try:
         yield certain
     finally:
@@ -295,19 +295,19 @@ def claimed(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
         os.close(file)
 
 
-def _locked(name: Path, *, wait: bool) -> tuple[int, bool]:
-    """Open and lock a file; return also whether there are locks."""
+def open_locked(name: Path, *, wait: bool) -> tuple[int, bool]:
+    """Open and lock a file; return it, and whether there are locks."""
     # A link in a folder from elsewhere is not followed: its target would be overwritten.
-    here = getattr(os, "O_NOFOLLOW", 0)
+    no_links = getattr(os, "O_NOFOLLOW", 0)
     while True:
         try:
-            file = os.open(name, os.O_RDWR | os.O_CREAT | here, 0o666)
+            file = os.open(name, os.O_RDWR | os.O_CREAT | no_links, 0o666)
         except PermissionError:
             if not name.exists():
                 raise
-            file = os.open(name, os.O_RDONLY | here)  # another user's, left by a killed run
+            file = os.open(name, os.O_RDONLY | no_links)  # a killed run of another user left it
         try:
-            certain = _lock(file)
+            certain = lock(file)
             # The last owner may have removed the file meanwhile: then it protects nothing.
             if not certain or os.path.samestat(os.fstat(file), name.stat()):
                 return file, certain
@@ -321,15 +321,15 @@ def _locked(name: Path, *, wait: bool) -> tuple[int, bool]:
         os.close(file)
 
 
-def _lock(file: int) -> bool:
-    """Lock a file, write into it who did, and return True; False where there are no locks."""
+def lock(file: int) -> bool:
+    """Lock a file, write the owner into it, and return True; False if there are no locks."""
     try:
         import fcntl
 
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except (BlockingIOError, PermissionError) as error:
-        who = os.pread(file, 200, 0).decode(errors="replace") or "it has just begun"
-        raise BlockingIOError(errno.EAGAIN, f"another run is writing it ({who})") from error
+        owner = os.pread(file, 200, 0).decode(errors="replace") or "it has just begun"
+        raise BlockingIOError(errno.EAGAIN, f"another run is writing it ({owner})") from error
     except (ImportError, OSError):  # the system has none, or the disk
         return False
     now = datetime.now().astimezone().isoformat(" ", "seconds")
@@ -340,13 +340,13 @@ def _lock(file: int) -> bool:
 
 
 @contextmanager
-def _made(folder: Path) -> Iterator[None]:
-    """Make a folder and its parents; the new ones that stay empty are removed at the end."""
-    missing = [each for each in (folder, *folder.parents) if not each.exists()]
+def new_folder(folder: Path) -> Iterator[None]:
+    """Make a folder and its parents; those that stay empty are removed at the end."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield
     finally:
-        for each in missing:
+        for path in missing:
             with suppress(OSError):
-                each.rmdir()
+                path.rmdir()

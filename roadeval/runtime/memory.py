@@ -1,4 +1,4 @@
-"""Memory: freed memory returned to the system, and a message where there is not enough."""
+"""Memory: freed memory returned to the system, and a message if there is not enough."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ _LACKING: Final = re.compile(
     re.IGNORECASE,
 )
 LARGEST: Final = 32 << 20
+"""Size of the largest arrays whose memory `reuse` keeps."""
 M_TRIM_THRESHOLD: Final = -1
 M_MMAP_THRESHOLD: Final = -3
-"""The numbers of what `reuse` sets, in glibc's ``malloc.h``."""
+"""Numbers of the parameters that `reuse` sets, from glibc's ``malloc.h``."""
 TRIM_EVERY: Final = 256
 """Items of a long loop between two calls of `trim`, which takes ten milliseconds."""
 
@@ -28,8 +29,8 @@ TRIM_EVERY: Final = 256
 def trim() -> None:
     """Return freed memory to the system: between the phases of a run, and every `TRIM_EVERY` items.
 
-    What training had freed was an eighth of a run's peak. Freed memory between pieces that stay
-    grows for hours: by 100 MiB in 16,000 images of 1280x720. Only glibc has to be asked.
+    The memory that training frees is an eighth of a run's peak. Freed memory between arrays that
+    stay grows for hours: by 100 MiB in 16,000 images of 1280x720. Only glibc needs this call.
     """
     if sys.platform == "linux":
         malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -40,8 +41,8 @@ def trim() -> None:
 def reuse() -> None:
     """Keep the memory that a frame has freed for the next one, of arrays up to `LARGEST` bytes.
 
-    By itself glibc returns it at once, and the system clears each page that it gives out again: a
-    tenth of what a replay computes. What is left over goes with `trim`.
+    By default glibc returns it at once, and the system clears each page that it gives out again: a
+    tenth of a replay's CPU time. `trim` returns the rest.
     """
     if sys.platform == "linux" and (mallopt := getattr(ctypes.CDLL(None), "mallopt", None)):
         for parameter in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):
@@ -49,7 +50,7 @@ def reuse() -> None:
 
 
 def resident() -> int:
-    """Return the bytes of memory that the process holds; 0 where the system does not say."""
+    """Return the bytes of memory that the process holds; 0 if the system does not say."""
     if sys.platform != "linux":
         return 0
     return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE
@@ -61,5 +62,5 @@ def is_lacking(error: BaseException) -> bool:
     >>> is_lacking(RuntimeError("can't start new thread"))
     True
     """
-    said = isinstance(error, ImportError | RuntimeError) or type(error).__module__ == "cv2"
-    return isinstance(error, MemoryError) or (said and bool(_LACKING.search(str(error))))
+    may_tell = isinstance(error, ImportError | RuntimeError) or type(error).__module__ == "cv2"
+    return isinstance(error, MemoryError) or (may_tell and bool(_LACKING.search(str(error))))

@@ -20,11 +20,11 @@ class Flag:
     """The flag of the command line that sets a field."""
 
     names: str
-    """Separated by spaces; messages name the last one."""
+    """Its names, separated by spaces; messages use the last one."""
     metavar: str = ""
     """The placeholder of the value in the help; empty for a switch."""
     group: str = ""
-    """Its part of the help, if that differs from the part of its table."""
+    """Its section of the help, if that differs from the section of its table."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,12 @@ def meanings(kind: type) -> Mapping[str, str]:
     """Return the string after each field of a class, and of its bases; none without a source."""
     texts: dict[str, str] = {}
     for base in reversed(kind.__mro__):
-        texts |= _meanings(base.__module__).get(base.__qualname__, {})
+        texts |= read_meanings(base.__module__).get(base.__qualname__, {})
     return texts
 
 
 @cache
-def _meanings(module: str) -> Mapping[str, Mapping[str, str]]:
+def read_meanings(module: str) -> Mapping[str, Mapping[str, str]]:
     """Return the strings after the fields of a module's classes."""
     try:
         source = inspect.getsource(sys.modules[module])

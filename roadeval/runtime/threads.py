@@ -1,4 +1,4 @@
-"""An ordered, bounded map over worker threads, and an end to calls of libraries that have none."""
+"""An ordered, bounded map over worker threads, and time limits for calls of libraries."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ R = TypeVar("R")
 AHEAD: Final = 2
 """Items in the queue beyond those in work, so that no worker waits for the consumer."""
 WATCHED_S: Final = 0.05
-"""Seconds between two looks of `ended` at the clock."""
+"""Seconds between two looks of `time_limit` at the clock."""
 _LOCAL: Final = threading.local()
-"""In a thread of `ordered`: the event ``stopped``."""
+"""Holds the event ``stopped`` in a thread of `ordered`."""
 
 
 def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R]:
     """Yield ``work(item)`` for every item, in the items' order, computed by ``jobs`` threads.
 
-    The items are drawn as results are taken, at most ``jobs + 2`` ahead (back-pressure: memory
-    does not grow with their number). The first exception, of ``work`` or of ``items``, is
-    raised at its place in the order, after the items in work have finished. The same happens when
-    the caller stops early: work within `ended` is then ended at once.
+    At most ``jobs + 2`` items are taken ahead of the results, so that memory does not grow with
+    their number. The first exception, of ``work`` or of ``items``, is raised at its place in the
+    order, after the items in work have finished. If the caller stops early, they finish as well,
+    and work within `time_limit` ends at once.
     """
     stopped = threading.Event()
-    told = partial(setattr, _LOCAL, "stopped", stopped)
-    with one_thread_each(), ThreadPoolExecutor(jobs, "roadeval", initializer=told) as pool:
+    initializer = partial(setattr, _LOCAL, "stopped", stopped)
+    with one_thread_each(), ThreadPoolExecutor(jobs, "roadeval", initializer) as pool:
         waiting: deque[Future[R]] = deque()
         try:
             for item in items:
@@ -65,13 +65,13 @@ def in_thread(call: Callable[[], R]) -> Future[R]:
 
 
 @contextmanager
-def ended(
+def time_limit(
     end: Callable[[], None], seconds: float, grown: float = math.inf
 ) -> Iterator[threading.Event]:
-    """Call ``end`` where the work within takes longer than some seconds; the event is then set.
+    """Call ``end`` if the work within takes longer than some seconds; then the event is set.
 
-    So it is where the process grows by more than ``grown`` bytes. It is called, too, where
-    `ordered`, of which this is a thread, is stopped: no exception reaches what a library computes.
+    The same happens if the process grows by more than ``grown`` bytes. In a thread of `ordered` a
+    stop calls ``end`` as well, since no exception reaches the code of a library.
     """
     done, late = threading.Event(), threading.Event()
     stopped, until = getattr(_LOCAL, "stopped", done), time.monotonic() + seconds
@@ -97,8 +97,8 @@ def ended(
 def one_thread_each() -> Iterator[None]:
     """Keep BLAS and OpenCV from starting threads of their own while `ordered` runs.
 
-    They would compete with the threads here: on a busy machine BLAS threads that spin while they
-    wait for each other made an item ten times slower.
+    They would compete with the threads here: on a busy machine, BLAS threads that spin while they
+    wait for each other make an item ten times slower.
     """
     import cv2
     from threadpoolctl import threadpool_limits

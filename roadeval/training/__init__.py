@@ -1,1 +1,1 @@
-"""How a pipeline learns: which frames, which pixels, what is fitted, and the model file."""
+"""How a pipeline learns: its training frames and pixels, the fit, and the model file."""

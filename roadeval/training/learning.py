@@ -1,11 +1,11 @@
-"""Where a run's model comes from, and how every variant is fitted to the same frames and pixels."""
+"""How the model of a run is made: which frames train it, and how each variant is fitted to them."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,19 +18,19 @@ from roadeval.logs.frames import LoggedFrame
 from roadeval.logs.truth.picks import Picks, Why
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
-from roadeval.pipeline.scene import exposed, reach, scene_of, stretched
+from roadeval.pipeline.scene import expose_by_patch, reach, scene_of, stretch
 from roadeval.pipeline.stage import Output, TrainingSet, View
 from roadeval.runtime.threads import ordered
-from roadeval.training.model import Model, kept_model
+from roadeval.training.model import Model, load_cached_model
 from roadeval.training.settings import TrainingSettings
 
 WIDTH: Final = 160
-"""Columns of the working image on which paths are sought from the reference patch."""
+"""Columns of the working image on which the distance from the reference patch is computed."""
 _AT_ONCE: Final = 2
 """Variants that are fitted together; each holds its filtered images meanwhile."""
 
 Pipelines = Mapping[str, Pipeline]
-"""By variant."""
+"""Pipelines by variant."""
 
 
 class TrainingError(RoadevalError):
@@ -43,12 +43,11 @@ def fit(
     settings: TrainingSettings,
     base: Model | None = None,
 ) -> Model:
-    """Train every variant that learns anything on decoded frames.
+    """Train every variant that learns on decoded frames; their truths make the baseline.
 
-    Their truths, where they have any, make the baseline. A `TrainingError` if there is no frame, or
-    if the frames show road alone or no road at all and some variant has something to learn. The
-    frames have truth, unless ``settings.source`` allows the patch. ``base`` is what the variants
-    have learnt from other drives: stages that can learn further do so, the others stay as they are.
+    A `TrainingError` if some variant learns and there is no frame, or the frames show only road or
+    no road at all. The frames have truth, unless ``settings.source`` allows the patch. ``base`` is
+    the model of other drives: stages that can learn further do so, the others stay unchanged.
     """
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
     if learning and not frames:
@@ -80,8 +79,8 @@ def fit(
         drawn = replace(drawn, images=images, truths=tuple(truths), share=share)
 
         def learn(name: str) -> dict[str, Any]:
-            known = base.parameters.get(name, {}) if base else {}
-            return _fitted(frames, drawn, pipelines[name], known)
+            learnt = base.parameters.get(name, {}) if base else {}
+            return fit_stages(frames, drawn, pipelines[name], learnt)
 
         parameters |= zip(learning, ordered(learn, learning, _AT_ONCE), strict=True)
     return Model(
@@ -94,13 +93,13 @@ def fit(
     )
 
 
-def _fitted(
+def fit_stages(
     frames: Sequence[Frame], training_set: TrainingSet, pipeline: Pipeline, base: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Fit the stages in order.
+    """Fit the stages in order, and return their parameters.
 
-    What follows a filter learns from the filtered images, and what hears another method from what
-    that says of them.
+    A stage after a filter learns from the filtered images, and a stage that hears another one from
+    its outputs.
     """
     parameters = dict(base)
     heard = pipeline.heard()
@@ -113,8 +112,8 @@ def _fitted(
         if stage.yields_mask and stage not in heard:
             continue
         run = stage.bind(settings, parameters.get(stage.name))
-        seen = zip(frames, training_set.images, strict=True)
-        views = (View.of_frame(each).after(Output(image=image)) for each, image in seen)
+        pairs = zip(frames, training_set.images, strict=True)
+        views = (View.of_frame(frame).after(Output(image=image)) for frame, image in pairs)
         after = (view.after(run(view)) for view in views)
         if stage.yields_mask:
             opinions = tuple(view.opinion and replace(view.opinion, layers=()) for view in after)
@@ -127,10 +126,9 @@ def _fitted(
 def sample(truths: Sequence[Truth], settings: TrainingSettings) -> TrainingSet:
     """Draw pixels of both classes from the truths of the training frames, without the images.
 
-    Each frame gives at most ``pixels_per_class`` of either class; then the class that has more
-    is thinned to the size of the other, so that the sample is balanced however little road (or
-    sky) a frame shows. Ignored pixels are never drawn. The same truths and settings give the
-    same pixels.
+    Each frame gives at most ``pixels_per_class`` of either class; then the larger class is thinned
+    to the size of the other, so that the sample is balanced however little road (or sky) a frame
+    shows. Ignored pixels are never drawn. The same truths and settings give the same pixels.
     """
     rng = np.random.default_rng(settings.seed)
     share = max(1, min(settings.pixels_per_class, settings.max_pixels // (2 * len(truths))))
@@ -144,23 +142,22 @@ def sample(truths: Sequence[Truth], settings: TrainingSettings) -> TrainingSet:
             drawn.append(np.stack([np.full(len(chosen), index), *places]))
         classes.append(np.concatenate(drawn, axis=1))
     size = min(*(drawn.shape[1] for drawn in classes), settings.max_pixels // 2)
-    kept = [drawn[:, np.sort(rng.permutation(drawn.shape[1])[:size])] for drawn in classes]
-    frame, row, column = np.concatenate(kept, axis=1)
+    thinned = [drawn[:, np.sort(rng.permutation(drawn.shape[1])[:size])] for drawn in classes]
+    frame, row, column = np.concatenate(thinned, axis=1)
     return TrainingSet((), frame, row, column, np.arange(2 * size) < size, settings.seed)
 
 
 def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     """Guess the truth of an ``(H, W, 3)`` uint8 RGB image from its reference patch.
 
-    The ground right in front of a vehicle is road, and so is what can be reached from there without
-    crossing a strong edge, such as a kerb, a wall or another vehicle.
-    Road (1) is the patch, and what lies below the horizon row and nearer to the patch than
-    ``settings.far``, see `reach`; all else is not (0). The patch also sets the exposure. Returns
-    ``(H, W)`` uint8.
+    The ground right in front of a vehicle is road, and so are pixels that a path from there reaches
+    without crossing a strong edge, such as a kerb, a wall or another vehicle. Road (1) is the
+    patch, and every pixel below the horizon row and nearer to the patch than ``settings.far``, see
+    `reach`; all others are not (0). The patch also sets the exposure. Returns ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
-    scene = scene_of(exposed(image, settings.patch), WIDTH, settings.patch)
-    near = stretched(reach(scene), image.shape) < settings.far
+    scene = scene_of(expose_by_patch(image, settings.patch), WIDTH, settings.patch)
+    near = stretch(reach(scene), image.shape) < settings.far
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))
@@ -173,16 +170,16 @@ class Schedule:
     digests: frozenset[str] = frozenset()
     """Hashes of the frames that trained the model."""
     trained: frozenset[int] = frozenset()
-    """Numbers of those frames, where all of them are this run's."""
+    """Numbers of those frames, if all of them are this run's."""
     gap: frozenset[int] = frozenset()
     """Numbers of the frames after them that are left out as well."""
     first: int | None = None
-    """Number of the first frame to evaluate, where it is known beforehand."""
+    """Number of the first frame to evaluate, if it is known beforehand."""
     picks: Picks | None = None
-    """Which frames were picked to be labelled: those that were drawn at random are evaluated."""
+    """The frames that were picked to be labelled; only those drawn at random are evaluated."""
 
     def role(self, frame: Frame) -> Role:
-        """Return what a decoded frame is used for."""
+        """Return the use of a decoded frame."""
         if frame.digest() in self.digests:
             copied = self.trained and frame.number not in self.trained
             return Role.COPY if copied else Role.TRAINING
@@ -208,18 +205,18 @@ BY_PATCH: Final = (
 def from_file(path: Path, pipelines: Pipelines) -> tuple[Model, Schedule]:
     """Read a model file and check that it was made for these variants.
 
-    Whether what it learnt fits their settings turns out when they are bound.
+    Binding the variants then checks that its parameters fit their settings.
     """
     stages = (stage for pipeline in pipelines.values() for stage in pipeline.stages())
-    model = kept_model(path, tuple(dict.fromkeys(stages)))
+    model = load_cached_model(path, tuple(dict.fromkeys(stages)))
     for name, pipeline in pipelines.items():
         model.require(name, pipeline, path)
     return model, Schedule(model.digests)
 
 
 Frames = Callable[..., Iterable[LoggedFrame]]
-"""Returns the frames of a range, in order and from the first at each call; given some numbers, or
-asked for labelled ones, it may leave out all others."""
+"""A function that returns the frames of a range in order, from the first at each call. If numbers
+of frames, or labelled frames, are asked for, it may leave out all others."""
 
 
 def from_log(
@@ -232,15 +229,14 @@ def from_log(
     base: Model | None = None,
     picks: Picks | None = None,
 ) -> tuple[Model, Schedule]:
-    """Train on some frames of a log.
+    """Train on some frames of a log; return the model and the schedule of the run.
 
-    A `TrainingError` if there is nothing to learn from, or nothing left to evaluate. Of the
-    ``frames`` of the selected range only as many are decoded as are needed, and ``on_frame`` is
-    called with the number of those so far. ``labelled`` says that the log's truth may be used: then
-    only frames that have one train, and some must be left to evaluate. Where no frame of the range
-    has one, the first ones train. ``base`` is what was learnt from other drives. With ``picks``
-    those train that were picked by rank. Returned are the model and which frames are left
-    out.
+    A `TrainingError` if there is nothing to learn from, or no frame is left to evaluate. Only as
+    many ``frames`` of the selected range are decoded as are needed; ``on_frame`` receives their
+    number so far. With ``labelled`` the log's truth may be used: then only labelled frames train,
+    and some must be left to evaluate; if no frame of the range is labelled, the first ones train.
+    ``base`` is a model of other drives, to learn further. With ``picks`` the frames picked by rank
+    train.
     """
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
     if not learning:
@@ -252,37 +248,37 @@ def from_log(
         )
     held, schedule = HeldFrames(on_frame), Schedule()
     if labelled and picks:
-        every = frames(labelled=True)
-        ranked = (each for each in every if picks.is_picked(each.stamp_ns, Why.RANKED))
-        for frame in decoded(ranked):
+        in_range = frames(labelled=True)
+        ranked = (frame for frame in in_range if picks.is_picked(frame.stamp_ns, Why.RANKED))
+        for frame in decode_all(ranked):
             if frame.truth is not None and not picks.is_proposal(frame.stamp_ns, frame.truth):
                 held.add(frame)
     with_truth = labelled and picks is None
-    with_truth = with_truth and any(each.labelled for each in frames(labelled=True))
+    with_truth = with_truth and any(frame.labelled for frame in frames(labelled=True))
     by_truth = with_truth or bool(held.frames)
     if base is not None:
-        _require_adaptable(pipelines, settings, by_truth=by_truth)
+        require_adaptable(pipelines, settings, by_truth=by_truth)
     if not held.frames:
-        schedule = _choose(frames, settings, held, with_truth=with_truth)
+        schedule = choose_frames(frames, settings, held, with_truth=with_truth)
     warnings = []
     if labelled and not by_truth:
-        which = "picked by rank is labelled" if picks else "read has road truth"
-        warnings.append(f"no frame that {'was' if picks else 'is'} {which}: {BY_PATCH}")
+        lacking = "was picked by rank is labelled" if picks else "is read has road truth"
+        warnings.append(f"no frame that {lacking}: {BY_PATCH}")
     if base is not None:
-        how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
+        kind = "labelled frames" if by_truth else "frames, by the reference patch in them,"
         warnings.append(
             f"the model of other drives ({settings.model}) was adapted to this drive with "
-            f"{len(held.frames)} of its own {how}: the rates are not those on a drive that it has "
+            f"{len(held.frames)} of its own {kind}: the rates are not those on a drive that it has "
             "not seen"
         )
     model = fit(held.frames, pipelines, settings, base)
-    own = frozenset(frame.number for frame in held.frames) if base is None else frozenset()
-    schedule = replace(schedule, digests=model.digests, trained=own, picks=picks)
+    trained = () if base else (frame.number for frame in held.frames)
+    schedule = replace(schedule, digests=model.digests, trained=frozenset(trained), picks=picks)
     return replace(model, warnings=tuple(warnings)), schedule
 
 
-def _require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_truth: bool) -> None:
-    """Raise a `TrainingError` where a model of other drives cannot or should not learn further."""
+def require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_truth: bool) -> None:
+    """Raise a `TrainingError` if a model of other drives cannot or should not learn further."""
     for name, pipeline in pipelines.items():
         learning = [stage for stage in pipeline.stages() if stage.fit is not None]
         if learning and not any(stage.adapt for stage in learning):
@@ -299,50 +295,50 @@ def _require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_t
         )
 
 
-def _choose(
+def choose_frames(
     frames: Frames, settings: TrainingSettings, held: HeldFrames, *, with_truth: bool
 ) -> Schedule:
     """Hold ``settings.frames`` frames, and return which others are left out because of them.
 
     They are the first ones, and the gap lies after them; or they are spread at equal distances, and
-    a gap lies on both sides of each. ``with_truth`` says that all of them are labelled, and that
-    one must be left to evaluate; a `TrainingError` if none is.
+    a gap lies on both sides of each. With ``with_truth`` all of them are labelled, and one must be
+    left to evaluate; a `TrainingError` if none is.
     """
-    every: list[int] = []
+    numbers: list[int] = []
 
     def candidates() -> Iterator[LoggedFrame]:
-        for each in frames(labelled=with_truth):
-            if each.labelled or not with_truth:
-                every.append(each.number)
-                yield each
+        for frame in frames(labelled=with_truth):
+            if frame.labelled or not with_truth:
+                numbers.append(frame.number)
+                yield frame
 
     following, lost = candidates(), dict[int, str]()
     if is_spread := settings.placement == "spread":
-        deque(following, 0)  # to its end: `every` is whole then
-        chosen = frozenset(evenly(every, settings.frames))
-        following = (each for each in frames(chosen) if each.number in chosen)
-    for frame in islice(decoded(following, lost), settings.frames):
+        deque(following, 0)  # to the end: then `numbers` is complete
+        chosen = frozenset(choose_evenly(numbers, settings.frames))
+        following = (frame for frame in frames(chosen) if frame.number in chosen)
+    for frame in islice(decode_all(following, lost), settings.frames):
         held.add(frame)
     gap = settings.gap or 0
     if not is_spread:
-        deque(islice(following, gap + 1), 0)  # so that the gap is in `every`, too
+        deque(islice(following, gap + 1), 0)  # so that the gap is in `numbers`, too
     elif settings.gap is None:
-        gap = max(1, len(every) // max(4 * len(held.frames), 1))
+        gap = max(1, len(numbers) // max(4 * len(held.frames), 1))
     if lost and not held.frames:
         raise TrainingError(
             f"none of the {len(lost)} frames to train on can be decoded; the first: "
             f"{next(iter(lost.values()))}"
         )
     trained = {frame.number for frame in held.frames}
-    places = {place for place, number in enumerate(every) if number in trained}
+    places = {place for place, number in enumerate(numbers) if number in trained}
     near = {place + by for place in places for by in range(-gap * is_spread, gap + 1)} - places
-    beside = frozenset(number for place, number in enumerate(every) if place in near)
-    left = [number for number in every if number not in beside | trained | lost.keys()]
+    beside = frozenset(number for place, number in enumerate(numbers) if place in near)
+    left = [number for number in numbers if number not in beside | trained | lost.keys()]
     if with_truth and trained and not left:
         raise TrainingError(
-            f"the range has {len(every)} labelled frames, and training would take {len(trained)} "
+            f"the range has {len(numbers)} labelled frames, and training would take {len(trained)} "
             f"of them and {len(beside)} more as a gap: none is left to evaluate; set "
-            f"`training.frames` to {max(len(every) // (2 + 2 * gap), 1)}, give `training.model`, "
+            f"`training.frames` to {max(len(numbers) // (2 + 2 * gap), 1)}, give `training.model`, "
             "or run what learns nothing with `only`"
         )
     return Schedule(gap=beside, first=left[0] if left else None)
@@ -353,40 +349,44 @@ def from_drives(
 ) -> Model:
     """Train on frames of some drives, by the drives' paths.
 
-    A `TrainingError` if some drives have truth and others have none, or none has although the
-    settings insist on it, or there is nothing to learn from.
+    A `TrainingError` if there is nothing to learn from; or some drives have truth and others have
+    none; or none has truth and the settings insist on it.
     """
-    bare = [path for path, own in frames.items() if not any(f.truth is not None for f in own)]
+    bare = [
+        path
+        for path, drive_frames in frames.items()
+        if all(frame.truth is None for frame in drive_frames)
+    ]
     insists = settings.source == "truth" or len(bare) < len(frames)
     if bare and insists and settings.source != "patch":
         raise TrainingError(
             f"{bare[0]}: no road truth to train on in the range; name its topic with "
             '`topics.truth`, leave the drive out, or set training.source = "patch"'
         )
-    model = fit([frame for own in frames.values() for frame in own], pipelines, settings)
+    model = fit([*chain.from_iterable(frames.values())], pipelines, settings)
     if not bare or settings.source == "patch":
         return model
     return replace(model, warnings=(f"no drive has road truth in the range: {BY_PATCH}",))
 
 
-def spread(
+def decode_evenly(
     frames: Callable[[], Iterable[LoggedFrame]], count: int, *, labelled: bool
 ) -> Iterator[Frame]:
-    """Decode ``count`` frames, spread evenly over those that there are.
+    """Decode ``count`` frames at equal distances.
 
-    ``frames`` begins anew at each call: once to see which there are, once to read them. Where
-    ``labelled``, those with truth alone are taken, if there is any.
+    ``frames`` starts from the first frame at each call: one call lists them, one reads them. With
+    ``labelled`` only frames with truth are taken, if there are any.
     """
-    seen = {frame.number: frame.labelled for frame in frames()}
-    numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
-    chosen = frozenset(evenly(numbers, count))
-    return decoded(each for each in frames() if each.number in chosen)
+    is_labelled = {frame.number: frame.labelled for frame in frames()}
+    numbers = [number for number in is_labelled if is_labelled[number] and labelled]
+    chosen = frozenset(choose_evenly(numbers or [*is_labelled], count))
+    return decode_all(frame for frame in frames() if frame.number in chosen)
 
 
 class HeldFrames:
-    """The training frames of a run: decoded, all of them, as long as it trains.
+    """The decoded training frames of a run, which are all in memory until it has trained.
 
-    ``on_frame`` is called with their number after each.
+    ``on_frame`` receives their number after each.
     """
 
     def __init__(self, on_frame: Callable[[int], None] = lambda _count: None) -> None:
@@ -397,9 +397,9 @@ class HeldFrames:
     def add(self, frame: Frame) -> None:
         """Hold a frame; a `TrainingError` if there is no room for it."""
         masks = [frame.truth, frame.shadow_truth, *frame.external.values()]
-        # Two filters in a row leave two more images of each frame while a variant is fitted.
+        # Two filters in a row make two more images of each frame while a variant is fitted.
         size = 3 * frame.image.nbytes + sum(mask.nbytes for mask in masks if mask is not None)
-        size += sum(each.nbytes for each in frame.probabilities.values())
+        size += sum(codes.nbytes for codes in frame.probabilities.values())
         self._bytes += size + len(frame.payload)
         if self._bytes > GREATEST_MEMORY:
             raise TrainingError(
@@ -411,24 +411,26 @@ class HeldFrames:
         self._on_frame(len(self.frames))
 
 
-def evenly(numbers: Sequence[int], count: int) -> list[int]:
+def choose_evenly(numbers: Sequence[int], count: int) -> list[int]:
     """Return ``count`` of the numbers, or all if there are fewer, at equal distances.
 
-    >>> evenly(range(20, 30), 4)
+    >>> choose_evenly(range(20, 30), 4)
     [20, 22, 25, 27]
     """
     taken = min(count, len(numbers))
     return [numbers[i * len(numbers) // taken] for i in range(taken)]
 
 
-def decoded(frames: Iterable[LoggedFrame], lost: dict[int, str] | None = None) -> Iterator[Frame]:
-    """Decode what can be decoded; ``lost`` receives why others cannot, by their numbers.
+def decode_all(
+    frames: Iterable[LoggedFrame], lost: dict[int, str] | None = None
+) -> Iterator[Frame]:
+    """Yield the frames that can be decoded; ``lost`` receives the others' errors by number.
 
-    They are reported when they are replayed.
+    Replaying them reports these errors.
     """
-    for each in frames:
+    for frame in frames:
         try:
-            yield each.decode()
+            yield frame.decode()
         except RoadevalError as error:
             if lost is not None:
-                lost[each.number] = str(error)
+                lost[frame.number] = str(error)

@@ -28,15 +28,15 @@ from roadeval.version import VERSION as ROADEVAL
 
 FORMAT: Final = "roadeval-model"
 VERSION: Final = 11
-"""Version of the file, the only one that is read; raised when a stage's parameters change."""
+"""Version of the file, the only one that is read; it grows when a stage's parameters change."""
 WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
-"""The version of roadeval by that of the file, where the file does not say it."""
+"""The version of roadeval by the file's version, for files that do not state it."""
 GREATEST_SIZE: Final = 1 << 29
 """Bytes that a model's arrays may take; those of `roadeval train` take a few million."""
 Arrays = dict[str, npt.NDArray[Any]]
-"""By name."""
+"""Arrays by name."""
 PRIOR: Final = "prior"
-"""The array that belongs to no variant."""
+"""Name of the array that belongs to no variant."""
 
 
 class ModelError(RoadevalError):
@@ -48,24 +48,22 @@ class Model:
     """The result of training."""
 
     parameters: Mapping[str, Mapping[str, Any]]
-    """By variant, then by stage: what the stage learnt."""
+    """The parameters that each stage has learnt, by variant, then by stage."""
     settings: Mapping[str, Mapping[str, Any]]
-    """By variant: the settings that training depended on (filters, and stages that learn)."""
+    """The settings that training depended on (filters, and stages that learn), by variant."""
     source: str
-    """``truth`` or ``patch``; ``none`` where nothing was learnt at all."""
+    """``truth`` or ``patch``; ``none`` if nothing was learnt at all."""
     digests: frozenset[str]
-    """The hashes of the frames that trained it (`roadeval.data.Frame.digest`). They are never
-    evaluated.
-    """
+    """Hashes of the frames that trained it (`roadeval.data.Frame.digest`), never evaluated."""
     pixels: int
+    """Number of training pixels."""
     prior: npt.NDArray[np.float32] | None = None
-    """``(H, W)`` float32: the share of training frames in which a pixel was road, which is what the
-    blind baseline thresholds; None without truth.
-    """
+    """``(H, W)`` float32: the share of training frames in which a pixel was road. The blind
+    baseline is a threshold on it; None without truth."""
     warnings: tuple[str, ...] = ()
-    """What a user should know before believing a result."""
+    """Doubts that a user should know before believing a result."""
     losses: tuple[str, ...] = ()
-    """What was lost of the drives when it was trained; not kept in a file."""
+    """Parts of the training drives that could not be read; not in the file."""
 
     def __post_init__(self) -> None:
         if self.prior is not None:
@@ -75,21 +73,21 @@ class Model:
     def require(self, variant: str, pipeline: Pipeline, path: Path) -> None:
         """Raise a `ModelError` for a variant that this model was not made for.
 
-        Settings that what is learnt does not depend on may differ, and a variant that learns
-        nothing needs no model.
+        Settings that the parameters do not depend on may differ, and a variant that learns nothing
+        needs no model.
         """
         if not pipeline.learning():
             return
         if variant not in self.settings:
-            known = ", ".join(sorted(self.settings))
+            variants = ", ".join(sorted(self.settings))
             raise ModelError(
-                f"{path}: the model has no variant {variant} (it has {known}); "
+                f"{path}: the model has no variant {variant} (it has {variants}); "
                 "train one with the same preset and variants"
             )
-        # Through JSON, as the file has been: tuples and lists are the same there.
-        wanted, made_for = json.loads(json.dumps(pipeline.relevant())), self.settings[variant]
-        for name in sorted({*made_for, *wanted}):
-            there, here = made_for.get(name, {}), wanted.get(name, {})
+        # Through JSON, as in the file, where tuples and lists are the same.
+        relevant, made_for = json.loads(json.dumps(pipeline.relevant())), self.settings[variant]
+        for name in sorted({*made_for, *relevant}):
+            there, here = made_for.get(name, {}), relevant.get(name, {})
             if there != here:
                 keys = [k for k in {**there, **here} if there.get(k) != here.get(k)]
                 differ = (f"{k} {there.get(k)} there, {here.get(k)} here" for k in keys)
@@ -108,7 +106,7 @@ class Model:
 def save_model(model: Model, path: Path) -> None:
     """Write a model file: a NumPy archive of plain arrays and one JSON text.
 
-    It appears under its name only when it is complete. The same model gives the same bytes.
+    The file appears under its name only when it is complete. The same model gives the same bytes.
     """
     arrays = {
         f"{variant}/{stage}/{name}": array
@@ -129,10 +127,10 @@ def save_model(model: Model, path: Path) -> None:
 
 
 def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
-    """Read a model file; it holds data alone, so a file from elsewhere runs no code.
+    """Read a model file; it holds only data, so that a file from elsewhere runs no code.
 
     A `ModelError` if the file is missing, no model, damaged, or of another version, or if it holds
-    what no training gives: arrays of a wrong shape, numbers that are not finite.
+    parameters that no training gives: arrays of a wrong shape, numbers that are not finite.
 
     Parameters
     ----------
@@ -142,41 +140,42 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
         Further stages whose parameters it may hold, as ``config.pipelines()["mine"].stages()``.
         A file loads no stage by itself.
     """
-    header, arrays = _content(path)
+    header, arrays = read_archive(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
     if (version := header.get("version")) != VERSION:
         number = version if isinstance(version, int) else 0
         writer = header.get("roadeval") or WROTE.get(number)
-        told = another_format(writer, later=number > VERSION, remedy="train it again")
-        raise ModelError(f"{path}: {told}")
+        problem = another_format(writer, later=number > VERSION, remedy="train it again")
+        raise ModelError(f"{path}: {problem}")
     try:
-        return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
+        return make_model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
         reason = str(error)
         if isinstance(error, ValidationError):
-            problem = error.errors(include_url=False)[0]
-            reason = f"{'.'.join(map(str, problem['loc']))}: {problem['msg'].lower()}"
+            first = error.errors(include_url=False)[0]
+            reason = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"
         raise ModelError(f"{path}: a damaged model file: {reason}; train it again") from error
 
 
-def kept_model(path: Path, stages: tuple[Stage, ...]) -> Model:
-    """Read a model file as `load_model` does, or return the one read before.
+def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
+    """Read a model file as `load_model` does; an unchanged file gives the same model again.
 
-    What a stage computes from a model alone is kept with it, as the SVM's table of colours.
+    Then stages can keep what they compute from a model alone, as the SVM's table of colours.
     """
     with suppress(OSError):
-        there = path.stat()
-        return _kept(path, stages, there.st_ino, there.st_size, there.st_mtime_ns)
-    return load_model(path)  # which says what is wrong
+        state = path.stat()
+        return _load(path, stages, state.st_ino, state.st_size, state.st_mtime_ns)
+    return load_model(path)  # it raises the error
 
 
 @lru_cache(maxsize=2)
-def _kept(path: Path, stages: tuple[Stage, ...], *_state: int) -> Model:
+def _load(path: Path, stages: tuple[Stage, ...], *_state: int) -> Model:
     return load_model(path, stages)
 
 
-def _content(path: Path) -> tuple[Any, Arrays]:
+def read_archive(path: Path) -> tuple[Any, Arrays]:
+    """Return header and arrays of a model file; a `ModelError` if it is none."""
     try:
         check_input(path)
         with ZipFile(path) as packed:
@@ -184,11 +183,11 @@ def _content(path: Path) -> tuple[Any, Arrays]:
                 raise ValueError("no model unpacks to so much")
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        # What does not begin as an array does comes out of the archive as bytes.
+        # NumPy returns members that are no arrays as bytes.
         if not all(isinstance(array, np.ndarray) for array in arrays.values()):
             raise ValueError("not all of it is arrays")
         return json.loads(arrays.pop("header").tobytes()), arrays
-    except Exception as error:  # archives are read by four libraries, each with errors of its own
+    except Exception as error:  # four libraries read an archive, each with errors of its own
         if isinstance(error, OSError) and error.strerror:
             raise ModelError(f"{path}: cannot read the model: {error.strerror}") from error
         raise ModelError(
@@ -207,74 +206,67 @@ class _Header:
     warnings: tuple[str, ...]
 
 
-def _model(content: dict[str, Any], arrays: Arrays, known: Mapping[str, Stage]) -> Model:
-    """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
-    given: dict[str, Any] = {name: content.get(name) for name in get_type_hints(_Header)}
-    header = _Header(**given)
+def make_model(content: dict[str, Any], arrays: Arrays, stages: Mapping[str, Stage]) -> Model:
+    """Return the model of a file; a ValueError if a part is missing or wrong."""
+    fields: dict[str, Any] = {name: content.get(name) for name in get_type_hints(_Header)}
+    header = _Header(**fields)
     prior = arrays.pop(PRIOR, None)
-    parts: dict[str, dict[str, Arrays]] = {variant: {} for variant in header.settings}
+    parts: dict[tuple[str, str], Arrays] = {}
     for name, array in arrays.items():
         variant, stage, entry = (*name.split("/", 2), "", "")[:3]
-        if variant not in parts:
+        if variant not in header.settings:
             raise ValueError(f"array {name} belongs to no variant")
-        parts[variant].setdefault(stage, {})[entry] = array
-    parameters: dict[str, dict[str, Any]] = {}
-    for variant, stages in parts.items():
-        parameters[variant] = {}
-        for stage, own in stages.items():
-            where = f"{variant}/{stage}"
-            if stage not in known or (kind := known[stage].parameters) is None:
-                raise ValueError(f"{where} is no stage that learns")
-            try:
-                parameters[variant][stage] = from_arrays(kind, own)
-            except ValueError as error:
-                raise ValueError(f"{where}: {error}") from error
+        parts.setdefault((variant, stage), {})[entry] = array
+    parameters: dict[str, dict[str, Any]] = {variant: {} for variant in header.settings}
+    for (variant, stage), part in parts.items():
+        if stage not in stages or (kind := stages[stage].parameters) is None:
+            raise ValueError(f"{variant}/{stage} is no stage that learns")
+        try:
+            parameters[variant][stage] = from_arrays(kind, part)
+        except ValueError as error:
+            raise ValueError(f"{variant}/{stage}: {error}") from error
     return Model(parameters, **vars(header), prior=prior)
 
 
 def arrays_of(learnt: Any) -> Arrays:
     """Return the fields of a dataclass as arrays by name.
 
-    Those of a field that is a dataclass, too, are ``field/name``; a part that is None has none.
+    The arrays of an inner dataclass are ``field/name``; a field that is None has none.
     """
-    found: Arrays = {}
+    arrays: Arrays = {}
     for field in dataclasses.fields(learnt):
         value = getattr(learnt, field.name)
         if dataclasses.is_dataclass(value):
-            found |= {f"{field.name}/{name}": array for name, array in arrays_of(value).items()}
+            arrays |= {f"{field.name}/{name}": array for name, array in arrays_of(value).items()}
         elif value is not None:
-            found[field.name] = np.asarray(value)
-    return found
+            arrays[field.name] = np.asarray(value)
+    return arrays
 
 
 def from_arrays(kind: type[Any], arrays: Arrays) -> Any:
-    """Return the dataclass whose arrays these are, see `arrays_of`.
+    """Return the dataclass with these arrays, the inverse of `arrays_of`.
 
-    A `ValueError` if an array is missing, or is not known, or the dataclass refuses what it is
-    given.
+    A `ValueError` if an array is missing or unknown, or the dataclass refuses it.
     """
-    parts = _parts(kind)
-    names = {field.name for field in dataclasses.fields(kind)}
-    whole = {name for name in arrays if name.partition("/")[0] not in parts or name in parts}
-    if wrong := (names - parts.keys()) ^ whole:
+    inner_kinds = inner_dataclasses(kind)
+    names = {field.name for field in dataclasses.fields(kind)} - inner_kinds.keys()
+    outer = {name for name in arrays if "/" not in name or name.split("/")[0] not in inner_kinds}
+    if wrong := names ^ outer:
         raise ValueError(f"missing or unknown arrays: {', '.join(sorted(wrong))}")
-    values: dict[str, Any] = {
-        name: array if array.ndim else array.item()
-        for name, array in arrays.items()
-        if name in names
-    }
-    for name, (part, optional) in parts.items():
+    values: dict[str, Any] = {name: arrays[name] for name in names}
+    values |= {name: array.item() for name, array in values.items() if not array.ndim}
+    for name, (inner_kind, optional) in inner_kinds.items():
         start = f"{name}/"
         inner = {key.removeprefix(start): arrays[key] for key in arrays if key.startswith(start)}
-        values[name] = from_arrays(part, inner) if inner or not optional else None
+        values[name] = from_arrays(inner_kind, inner) if inner or not optional else None
     return kind(**values)
 
 
-def _parts(kind: type[Any]) -> dict[str, tuple[type[Any], bool]]:
-    """Return those fields of a dataclass that are dataclasses, and whether each may be None."""
+def inner_dataclasses(kind: type[Any]) -> dict[str, tuple[type[Any], bool]]:
+    """Return the fields of a dataclass that are dataclasses, and whether each may be None."""
     try:
         hints = get_type_hints(kind)
-    except NameError:  # of names that type checkers alone import: a user's stage may have such
+    except NameError:  # a user's stage may import names for type checkers alone
         return {}
     return {
         name: (choice, type(None) in get_args(hint))

@@ -4,8 +4,16 @@ import cv2
 import numpy as np
 import pytest
 
+from roadeval import RunConfig, configure
 from roadeval.cli.app import main
+from roadeval.cli.options import OPTIONS, with_flags
+from roadeval.jobs.progress import Progress
+from roadeval.jobs.run.replay import Outcome
+from roadeval.logs.writing.writer import LogWriter
+from roadeval.results.facts import DriveFacts, FrameAccount
+from tests.fixtures.make import make
 from tests.jobs.making import write_log
+from tests.results.making import facts_of
 
 PATCH = '[training]\nsource = "patch"\nframes = 3'
 
@@ -82,3 +90,181 @@ def test_images_and_masks_become_one_log(folder, capsys):
     assert "images without a mask: 2.jpg" in said.err
     main(["info", f"{folder}/d.mcap"])
     assert "truth: /truth/road" in capsys.readouterr().out
+
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a log of 1 Hz with these topics; masks where a topic's values are given."""
+
+    def write(topics, seconds=range(4)):
+        with LogWriter(tmp_path / "drive.mcap") as log:
+            for second in seconds:
+                for topic, values in topics.items():
+                    image = np.resize(np.array(values or [120], np.uint8), (6, 8))
+                    stamp = START + second * SECOND
+                    if values:
+                        log.mask(topic, stamp, image)
+                    else:
+                        jpeg = cv2.imencode(".jpg", image)[1].tobytes()
+                        log.image(topic, stamp, jpeg, "jpeg")
+        return str(tmp_path / "drive.mcap")
+
+    return write
+
+
+def test_it_tells_what_replay_would_ask_for(write, capsys):
+    drive = write({"/camera": None, "/labels": [0, 1, 2, 3]})
+    assert main(["info", drive]) == 0
+    assert "replay would stop: drive.mcap: /labels holds the values 0 1 2 3" in (
+        capsys.readouterr().out
+    )
+    main(["info", drive, "--road-label", "3"])
+    assert "truth: /labels (" in capsys.readouterr().out
+
+
+def test_it_tells_where_messages_are_missing(write, capsys):
+    main(["info", write({"/camera": None}, seconds=[0, 1, 2, 3, 9])])
+    assert "/camera: gap of 6.00 s, 3.00 s after the start" in capsys.readouterr().out
+
+
+def test_damage_is_told_and_has_its_exit_code(tmp_path, capsys):
+    assert main(["info", str(make("broken/trunc_midchunk.mcap", tmp_path))]) == 3
+    assert capsys.readouterr().err.startswith("roadeval: lost: trunc_midchunk.mcap: ")
+
+
+FACTS = facts_of(
+    drive=DriveFacts("drive"), frames=FrameAccount(3, 3, labelled=0, skipped={"unlabelled": 3})
+)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What the main job was asked for; it does nothing and is done at once."""
+    asked = {"warnings": (), "losses": ()}
+
+    def replay(drive, config, *, on_progress):
+        asked.update(drive=drive, config=config)
+        on_progress(Progress(3, 3, "replaying"))
+        return Outcome(None, None, FACTS, asked["warnings"], asked["losses"], ())
+
+    monkeypatch.setattr("roadeval.jobs.run.replay.replay", replay)
+    return asked
+
+
+def test_every_option_arrives(asked, tmp_path):
+    settings = tmp_path / "narrow.toml"
+    settings.write_text("[shadow]\nring_width = 3\n")
+    words = (
+        "replay drive.mcap --save out.rrd --reports out --mcap o.mcap --preset printed "
+        f"--config {settings} --variant narrow={settings} --train-frames 5 "
+        "--train-gap 2 --image-topic /image --truth-topic /truth --shadow-topic /shadow "
+        "--road-label 3 --road-label 4 --ignore-label 11 --mask-topic net=/net "
+        "--sync-tolerance 2.5 --resize-truth -S 1.5 -E 2013-05-01T12:00:00Z "
+        "--every 2 --max-frames 7 --record none --jobs 1"
+    )
+    assert main(words.split()) == 0
+    assert asked["config"] == configure(
+        {
+            "preset": "printed",
+            "shadow": {"ring_width": 3},
+            "variants": {"narrow": {"shadow": {"ring_width": 3}}},
+            "training": {"frames": 5, "gap": 2},
+            "topics": {
+                "image": "/image",
+                "truth": "/truth",
+                "shadow": "/shadow",
+                "masks": {"net": "/net"},
+                "sync_tolerance_ms": 2.5,
+                "resize_truth": True,
+            },
+            "labels": {"road": [3, 4], "ignore": [11]},
+            "frames": {"start": "1.5", "end": "2013-05-01T12:00:00Z", "every": 2, "max_frames": 7},
+            "output": {"save": "out.rrd", "reports": "out", "mcap": "o.mcap", "record": "none"},
+            "run": {"jobs": 1},
+        }
+    )
+
+
+def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
+    (tmp_path / "c.toml").write_text('preset = "gated"\n')
+    words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--preset"]
+    assert main([*words, "gated"]) == 0
+    assert main([*words, "robust"]) == 1
+    assert "starts from preset gated, not from robust" in capsys.readouterr().err
+
+
+def test_a_model_and_training_frames_do_not_go_together(capsys):
+    assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
+    assert (
+        "--train-frames, --train-on and --train-gap do not go with a model (m)"
+        in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--road-label 3 --road-label 70000", "--road-label, item 2: must be at most 65535"),
+        (f"--road-label {'9' * 5000}", "--road-label, item 1: must be a whole number"),
+        ("--every 0", "--every: must be at least 1 (given: 0)"),
+    ],
+)
+def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
+    assert main(["replay", "d.mcap", *words.split()]) == 2
+    assert f"roadeval: error: {said}" in capsys.readouterr().err
+
+
+def test_every_option_s_words_are_a_setting_s_value(asked):
+    """The help's flags and the settings' names belong together, each once."""
+    assert main(["replay", "d.mcap", "--model", "city.model"]) == 0
+    assert asked["config"].training.model == "city.model"
+    flags = [flag for option in OPTIONS for flag in option.flags]
+    assert len({*flags}) == len(flags)
+    for option in OPTIONS:
+        table, _, key = option.setting.partition(".")
+        assert not key or hasattr(getattr(RunConfig(), table), key)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("lower `training.frames` or `frames.scale`", "lower --train-frames or --scale"),
+        ("name it with `topics.truth`.", "name it with --truth-topic."),
+        ("a.toml: frames.every: bad", "a.toml: frames.every: bad"),
+        ("output.mcap: No such file", "output.mcap: No such file"),
+        ("`training.source` has no flag", "`training.source` has no flag"),
+        ("`masks` my-net: bad", "--masks my-net: bad"),
+        (
+            "`masks.my-net.labels.road` is missing",
+            "`labels.road` in the file of --masks my-net=FILE.toml is missing",
+        ),
+    ],
+)
+def test_names_of_settings_become_flags(text, shown):
+    assert with_flags(text) == shown
+
+
+def test_warnings_are_told_even_when_quiet(asked, capsys):
+    asked["warnings"] = ("the classifier of filtered calls everything road",)
+    assert main(["replay", "drive.mcap", "--quiet"]) == 0
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err == ("roadeval: warning: the classifier of filtered calls everything road\n")
+
+
+def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
+    asked["losses"] = ("frame 7: its JPEG ends early",)
+    assert main(["replay", "drive.mcap", "--quiet"]) == 3
+    assert capsys.readouterr().err == "roadeval: lost: frame 7: its JPEG ends early\n"
+
+
+@pytest.mark.parametrize(
+    "words", ["--road-color 1,2", "--road-color red", "--mask-topic net", "--mask-topic truth=/x"]
+)
+def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
+    assert main(["replay", "drive.mcap", *words.split()]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,15 +1,18 @@
 """However a command ends: one line on stderr, no traceback, and the exit code for it."""
 
 import errno
+import json
 import os
 import signal
 import subprocess
 import sys
+from threading import Timer
 
 import pytest
 import typer
 
-from roadeval.cli.app import explain, main
+from roadeval.cli import signals
+from roadeval.cli.app import THREADS, explain, main
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.signals import Stopped
 
@@ -98,3 +101,149 @@ def test_cycles_are_searched_rarely_in_a_process_of_its_own_alone(call, ours):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == f"{ours} {ours}"
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, ExitCode.INTERRUPTED), (signal.SIGTERM, ExitCode.TERMINATED)],
+)
+def test_signals_at_once_are_raised_as_one_exception_that_runs_clean_up(number, code, times):
+    tidied = []
+
+    def work():
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            tidied.append("closed")
+
+    for place in range(1, times):
+        Timer(place * signals.GRACE_S / 2, os.kill, (os.getpid(), number)).start()
+    with pytest.raises(signals.Stopped) as stopped, signals.raised():
+        work()
+    assert stopped.value.exit_code == code
+    assert tidied == ["closed"]
+
+
+def test_a_later_signal_would_end_the_process_at_once():
+    handlers = []
+
+    def work():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            handlers.extend(map(signal.getsignal, (signal.SIGINT, signal.SIGTERM)))
+
+    with pytest.raises(signals.Stopped), signals.raised():
+        work()
+    assert handlers == [signal.SIG_DFL, signal.SIG_DFL]
+
+
+WHILE_IT_LOADS = """
+import os, signal, sys
+
+class Interrupt:
+    def find_spec(name, path, target=None):
+        if name == "roadeval.cli":
+            os.kill(os.getpid(), signal.SIGINT)
+
+signal.signal(signal.SIGINT, getattr(signal, sys.argv[1]))
+sys.meta_path.insert(0, Interrupt)
+sys.argv[1:] = ["--version"]
+from roadeval.__main__ import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill sends no SIGINT there")
+@pytest.mark.parametrize(("handler", "code"), [("default_int_handler", -2), ("SIG_IGN", 0)])
+def test_an_interrupt_while_the_program_loads_shows_no_traceback(handler, code):
+    done = subprocess.run(
+        [sys.executable, "-c", WHILE_IT_LOADS, handler], capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (code, b"")
+
+
+SAYS = "console.emit('gr\\xf6\\xdfe \\udce9 \\x1b[2J'); messages.warning('beware')"
+OTHERS = (
+    "os.write(2, b'libpng error\\n'); logging.warning('cache'); warnings.warn('font', stacklevel=1)"
+)
+
+
+def run(talk, redirected="", **environment):
+    """Run a command that only talks, in a process whose shell redirects its streams."""
+    program = (
+        "import json, logging, os, sys, warnings\n"
+        "from roadeval.cli import app, console, messages\n"
+        f"def talk(**_): {talk}\n"
+        "app.app = talk\n"
+        "sys.exit(app.main())"
+    )
+    shell = f'"$0" "$@" {redirected}'
+    known = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    return subprocess.run(
+        ["/bin/sh", "-c", shell, sys.executable, "-c", program],
+        env=known | {"PYTHONPATH": os.pathsep.join(sys.path)} | environment,
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("redirected", "reason"),
+    [(">&-", "Bad file descriptor"), (">/dev/full", "No space left on device")],
+)
+def test_a_stdout_that_takes_nothing_is_one_line(redirected, reason):
+    done = run(SAYS, redirected)
+    assert done.returncode == ExitCode.FAILED
+    assert done.stderr.decode().splitlines()[-1] == (
+        f"roadeval: error: standard output cannot be written: {reason}"
+    )
+
+
+@pytest.mark.parametrize("redirected", ["2>&-", "2>/dev/full"])
+def test_what_nobody_hears_on_stderr_is_no_error(redirected):
+    done = run(SAYS, redirected)
+    assert (done.returncode, done.stdout.count(b"\n")) == (0, 1)
+
+
+def test_no_file_takes_the_place_of_a_closed_stream():
+    held = "assert os.open('/dev/null', os.O_RDONLY) > 2"
+    assert run(held, "<&- >&- 2>&-").returncode == 0
+
+
+def test_what_libraries_say_is_not_shown_unless_asked_for():
+    assert run(OTHERS).stderr == b""
+    loud = run(OTHERS, ROADEVAL_DEBUG="1").stderr
+    assert all(word in loud for word in (b"libpng error", b"cache", b"font"))
+
+
+def test_what_ends_the_process_is():
+    crashed = run("os.abort()")
+    assert crashed.returncode == 128 + signal.SIGABRT
+    assert b"Abort" in crashed.stderr
+
+
+def test_text_is_escaped_in_every_encoding_of_the_streams():
+    assert run(SAYS).stdout.decode() == "größe \\udce9 \\u001b[2J\n"
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = run(SAYS, **plain)
+    assert (done.returncode, done.stdout) == (0, b"gr\\u00f6\\u00dfe \\udce9 \\u001b[2J\n")
+    done = run("console.emit(json.dumps('gr\\xf6\\xdfe', ensure_ascii=False))", **plain)
+    assert json.loads(done.stdout) == "größe"
+
+
+@pytest.mark.parametrize(
+    ("environment", "threads"),
+    [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2), ({"OMP_NUM_THREADS": "2"}, 2)],
+)
+@pytest.mark.skipif(
+    sys.platform != "linux" or len(os.sched_getaffinity(0)) < 2,
+    reason="BLAS takes as many threads as there are cores, and Linux counts them",
+)
+def test_blas_starts_threads_only_where_the_user_asks_for_them(environment, threads, monkeypatch):
+    for name in THREADS:
+        monkeypatch.delenv(name, raising=False)
+    counted = "import numpy; console.emit(str(len(os.listdir('/proc/self/task'))))"
+    assert int(run(counted, **environment).stdout) == threads

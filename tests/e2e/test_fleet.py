@@ -135,26 +135,6 @@ def test_a_comparison_of_a_fleet_names_the_drives_that_failed(ran, limit, code):
     assert "1 of 3 drives failed" in compare(ran.folder).content["warnings"][0]
 
 
-def test_the_numbers_are_those_of_single_replays(drives, ran, tmp_path):
-    scores = roadeval.Result(ran.folder).scores
-    for name in ("a", "c"):
-        alone = roadeval.replay(
-            drives / f"{name}.mcap",
-            roadeval.configure({**OPTIONS, "output": {"figures": False}}),
-            save=tmp_path / "out.rrd",
-            reports=tmp_path / "r",
-        )
-        own = scores[scores.drive.str.startswith(f"{name}-") & (scores.region == "all")]
-        totals = alone.summary["totals"]
-        assert {*zip(own.variant, own.stage, strict=True)} == {
-            (variant, stage) for variant, stages in totals.items() for stage in stages
-        }
-        for row in own.to_dict("records"):
-            total = totals[row["variant"]][row["stage"]]
-            for key in ("TP", "TN", "FP", "FN", "ERR", "FNR", "pooled_ERR"):
-                assert row[key] == total[key], (name, key)
-
-
 @pytest.mark.parametrize("gone", [[], ["c"]])
 def test_the_same_command_again_tries_what_failed_or_has_gone_alone(gone, drives, ran, tmp_path):
     folder = copied(ran, tmp_path)

@@ -234,7 +234,7 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
 
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
     shutil.copy(work / "street.mcap", work / "second.mcap")
-    (work / "first.toml").write_text('topics.truth = ""\nframes.max_frames = 20\n')
+    (work / "first.toml").write_text('topics.truth = ""\nframes.max_frames = 20\n' + QUICK)
     words = ("-n", 6, "-o", "both", "--config", "first.toml")
     done = here("pick", "street.mcap", "second.mcap", *words, cwd=work)
     assert done.returncode == 0, done.stderr

@@ -22,7 +22,7 @@ from roadeval.data import (
     VariantResult,
 )
 from roadeval.data.arrays import Bits
-from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
+from roadeval.evaluation.comparison.compare import ComparedResult, Comparison, MaskChange
 from roadeval.evaluation.comparison.pairing import ComparedDrive, Side
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
@@ -108,7 +108,7 @@ def a_drive(errors: Wrong, drive: str = "street", digest: str | None = "d1", **m
     """A drive of a result that is compared, with ``tables`` beside ``frames``."""
     key = {"drive": drive, "camera": more.pop("camera", CAMERA)}
     tables = {"frames": a_table(errors, **key), **more.pop("tables", {})}
-    about = {"name": drive, "asked": {}, "frames": tables["frames"]["frame"].nunique()}
+    about = {"name": drive, "settings": {}, "frames": tables["frames"]["frame"].nunique()}
     return ComparedDrive(**key, digest=digest, **about | more), tables
 
 
@@ -157,15 +157,15 @@ def a_change(
     stage: str = "post",
     final: bool = True,
     drives: int = 1,
-) -> Change:
+) -> MaskChange:
     """A mask whose every rate was 10 % and changed so much."""
     rates = ("ERR", "FPR", "FNR", "IoU")
     base, new = (dict.fromkeys(rates, rate) for rate in (0.1, 0.1 + difference.mean))
     differences = dict.fromkeys(rates[:3], difference)
-    return Change(result, variant, stage, final, drives, 12, base, new, differences)
+    return MaskChange(result, variant, stage, final, drives, 12, base, new, differences)
 
 
-def a_comparison(*changes: Change, **more: Any) -> Comparison:
+def a_comparison(*changes: MaskChange, **more: Any) -> Comparison:
     """A comparison with these changes, of one drive."""
     labels = ["base", *dict.fromkeys(change.result for change in changes)]
     parts = ("drives", "regions", "moved", "disagreements", "warnings")

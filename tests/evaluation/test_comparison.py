@@ -51,9 +51,12 @@ def test_a_result_that_does_not_know_its_log_is_not_compared():
 
 
 def test_settings_that_differ_are_named_with_both_values():
-    asked = {"frames.scale": 1.0, "svm.c": 1, "labels.road": [], "topics.truth": "/a"}
-    other = asked | {"frames.scale": 0.5, "labels.road": [3], "svm.c": 2}
-    base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
+    shared = {"frames.scale": 1.0, "svm.c": 1, "labels.road": [], "topics.truth": "/a"}
+    other = shared | {"frames.scale": 0.5, "labels.road": [3], "svm.c": 2}
+    base, new = (
+        a_side("base", [10, 20], settings=shared),
+        a_side("new", [10, 20], settings=other),
+    )
     found = compare([base, altered(new, truth=lambda checksums: checksums + 1)], SETTINGS)
     of_the_log = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
     assert found.changed_settings == {"new": of_the_log | {"svm.c": (1, 2)}}
@@ -65,8 +68,8 @@ def test_settings_that_differ_are_named_with_both_values():
 
 
 def test_a_change_between_scales_is_not_judged_but_a_level_is():
-    base = a_side("base", [10] * 12, asked={"frames.scale": 1.0})
-    found = compare([base, a_side("new", [12] * 12, asked={"frames.scale": 0.5})], SETTINGS)
+    base = a_side("base", [10] * 12, settings={"frames.scale": 1.0})
+    found = compare([base, a_side("new", [12] * 12, settings={"frames.scale": 0.5})], SETTINGS)
     why = unjudged(found, "post.filtered.ERR > 1pp")
     assert "not judged in new, because base and new were replayed with `frames.scale` 1 and" in why
     (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison.compare import Change
+from roadeval.evaluation.comparison.compare import MaskChange
 from roadeval.evaluation.comparison.conditions import Condition, ConditionError
 from roadeval.evaluation.stats.difference import Difference
 
-MASK = Change(
+MASK = MaskChange(
     result="new",
     variant="filtered",
     stage="post",

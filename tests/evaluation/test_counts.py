@@ -1,16 +1,30 @@
 """What is counted, pixel by pixel."""
 
+import math
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from sklearn import metrics as theirs
 from sklearn.metrics import confusion_matrix
 
 from roadeval.data import Counts, Packed, TruthBits
+from roadeval.evaluation import regions
+from roadeval.evaluation.metric import Metric
+from roadeval.evaluation.metrics import (
+    ALL,
+    OVERLAP,
+    of,
+    table,
+)
+from roadeval.evaluation.region import LabelledFrame
+from roadeval.evaluation.regions.standard import boundary, row_bands
 from roadeval.evaluation.score import counts
 from roadeval.evaluation.score.counts import error_map
-from tests.evaluation.making import pixels
+from roadeval.evaluation.settings import EvaluationSettings
+from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 
 TRUTH = pixels("##..", "##.?")
 
@@ -68,3 +82,120 @@ def test_the_error_map_names_each_outcome() -> None:
         ["TP", "FN", "FP", "TN"],
         ["TP", "TP", "FP", "ignored"],
     ]
+
+
+@pytest.mark.parametrize("metric", ALL.values(), ids=ALL)
+def test_a_metric_that_is_better_when_higher_rises_as_pixels_come_right(metric: Metric) -> None:
+    worse, better = (metric.function(Counts(10 + n, 10 + n, 5 - n, 5 - n)) for n in (0, 1))
+    assert (better > worse) is metric.higher_is_better
+
+
+@pytest.mark.parametrize(
+    ("counts", "undefined"),
+    [
+        (Counts(tn=5, fp=1), {"TPR", "FNR"}),
+        (Counts(tp=5, fn=1), {"TNR", "FPR"}),
+        (Counts(), {"ACC", "ERR", "TPR", "FNR", "TNR", "FPR"}),
+    ],
+)
+def test_a_rate_without_a_denominator_is_undefined(counts: Counts, undefined: set[str]) -> None:
+    assert {name for name, rate in of(counts).items() if math.isnan(rate)} == undefined
+
+
+def test_overlap_is_undefined_where_there_is_nothing_to_overlap() -> None:
+    nothing = Counts(tn=9)
+    assert all(math.isnan(metric.function(nothing)) for metric in OVERLAP.values())
+
+
+@settings(max_examples=40)
+@given(*[st.integers(1, 40)] * 4)
+def test_rates_equal_scikit_learns(tp: int, tn: int, fp: int, fn: int) -> None:
+    truth = np.repeat([1, 0, 0, 1], [tp, tn, fp, fn])
+    mask = np.repeat([1, 0, 1, 0], [tp, tn, fp, fn])
+    expected = {
+        "ACC": theirs.accuracy_score(truth, mask),
+        "ERR": theirs.zero_one_loss(truth, mask),
+        "TPR": theirs.recall_score(truth, mask),
+        "FNR": 1 - theirs.recall_score(truth, mask),
+        "TNR": theirs.recall_score(truth, mask, pos_label=0),
+        "FPR": 1 - theirs.recall_score(truth, mask, pos_label=0),
+        "IoU": theirs.jaccard_score(truth, mask),
+        "mIoU": theirs.jaccard_score(truth, mask, average="macro"),
+        "F1": theirs.f1_score(truth, mask),
+        "precision": theirs.precision_score(truth, mask),
+    }
+    found = {name: metric.function(Counts(tp, tn, fp, fn)) for name, metric in ALL.items()}
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.lists(st.tuples(*[st.sampled_from([0, 1, 7, 2_000_000_000])] * 4), min_size=1))
+def test_many_frames_rates_at_once_are_those_of_each_to_the_last_bit(
+    rows: list[tuple[int, int, int, int]],
+) -> None:
+    single = [list(of(Counts(*row)).values()) for row in rows]
+    np.testing.assert_array_equal(table(np.array(rows, np.int64)), single)
+
+
+def boundary_of(truth, width):
+    return unpacked(boundary(TruthBits.of(truth), width), truth.shape[1])
+
+
+def bands_of(shape, bands):
+    packed = row_bands(shape, bands).items()
+    return {name: unpacked(bits, shape[1]) for name, bits in packed}
+
+
+def of_frame(frame, bands, variants=()):
+    settings = EvaluationSettings(boundary_width=1, bands=bands)
+    labelled = LabelledFrame(frame, TruthBits.of(frame.truth), variants, settings)
+    found = regions.of_frame(labelled).items()
+    return {name: unpacked(bits, frame.truth.shape[1]) for name, bits in found}
+
+
+def test_the_boundary_lies_within_its_width_on_both_sides_of_the_edge() -> None:
+    truth = pixels("...####", "...####")
+    assert (boundary_of(truth, 1) == pixels("..##...", "..##...")).all()
+    assert (boundary_of(truth, 2) == pixels(".####..", ".####..")).all()
+
+
+def test_the_boundary_turns_corners() -> None:
+    truth = pixels("....", ".#..", "....", "....")
+    assert (boundary_of(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
+
+
+def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
+    bands = bands_of((7, 2), 5)
+    assert list(bands) == ["band_0", "band_1", "band_2", "band_3", "band_4"]
+    assert sum(bands.values()).tolist() == [[1, 1]] * 7
+    rows = [int(np.count_nonzero(band[:, 0])) for band in bands.values()]
+    assert sum(rows) == 7
+    assert max(rows) - min(rows) <= 1
+    assert bands["band_0"][0, 0] == bands["band_4"][6, 0] == 1
+
+
+def test_a_region_is_the_same_for_all_variants() -> None:
+    mask, first, second = pixels("#."), pixels("##"), pixels("..")
+    with_filter = a_variant("filtered", {"post": mask}, {"shadow": first})
+    another = a_variant("gated", {"post": mask}, {"shadow": second, "lit": second})
+    unfiltered = a_variant("unfiltered", {"post": mask})
+    found = of_frame(a_frame(mask), 1, (unfiltered, with_filter, another))
+    assert list(found)[:2] == ["shadow", "lit"]
+    assert (found["shadow"] == first).all()
+    assert (found["lit"] == second).all()
+
+
+def test_a_frame_has_true_shadow_only_if_the_log_has_it() -> None:
+    truth = pixels("##..")
+    every = {"boundary", "interior", "band_0", "band_1"}
+    found = of_frame(a_frame(truth), 2)
+    assert set(found) == every
+    shadowed = a_frame(truth, shadow=pixels("#.?#"))
+    found = of_frame(shadowed, 2)
+    assert set(found) == every | {"true_shadow"}
+    assert (found["true_shadow"] == pixels("#..#")).all()
+
+
+def test_regions_of_one_family_make_up_a_frame():
+    found = of_frame(a_frame(pixels("##..", "#...")), 2, ())
+    for family in (regions.HALVES, ("band_0", "band_1")):
+        assert (sum(found[name] for name in family) == 1).all()

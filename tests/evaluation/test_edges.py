@@ -117,45 +117,37 @@ def test_boundary_iou_is_the_authors_own_where_everything_is_labelled(shape):
     assert rims_overlap(mask, truth) == expected
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_boundary_iou_with_ignored_pixels_equals_distance_transforms(seed):
-    truth, mask = wavy(seed)
-    labelled, width = truth != IGNORE, 4  # 2 % of the diagonal of 200 pixels
-
-    def rim(road):
-        not_road = np.pad(labelled & ~road, 1, constant_values=True)
-        far = distance_transform_cdt(~not_road, "chessboard")[1:-1, 1:-1]
-        return labelled & road & (far <= width)
-
-    ours, theirs = rim(mask == 1), rim(truth == 1)
-    expected = (ours & theirs).sum() / (ours | theirs).sum()
-    assert rims_overlap(mask, truth) == expected
+def scattered(seed):
+    """A small truth and a mask without any order."""
+    draw = np.random.default_rng(seed)
+    values = draw.choice([[0, 1, IGNORE], [0, 0, IGNORE], [0, 1, 1]])
+    return draw.choice(np.array(values, np.uint8), (8, 8)), draw.integers(0, 2, (8, 8), np.uint8)
 
 
-def test_boundary_iou_of_small_masks_equals_a_plain_loop():
-    draw, defined = np.random.default_rng(0), 0
-    for _ in range(300):
-        values = draw.choice([[0, 1, IGNORE], [0, 0, IGNORE], [0, 1, 1]])
-        truth = draw.choice(np.array(values, np.uint8), (8, 8))
-        mask = draw.integers(0, 2, (8, 8), np.uint8)
-        both = either = 0
-        for pixel in np.ndindex(8, 8):
-            own = [in_rim(labels, truth, *pixel) for labels in (mask, truth)]
-            both, either = both + all(own), either + any(own)
-        found = rims_overlap(mask, truth)
-        assert found == both / either if either else math.isnan(found)
+PAIRS = [[*map(wavy, range(4))], [*map(scattered, range(200))]]
+with_ignored = pytest.mark.parametrize("pairs", PAIRS, ids=["wavy", "scattered"])
+
+
+def steps_to(pixels):
+    """Steps of a king from each pixel to the nearest of these; many where there is none."""
+    return distance_transform_cdt(~pixels, "chessboard") if pixels.any() else np.full((8, 8), 99)
+
+
+@with_ignored
+def test_boundary_iou_with_ignored_pixels_equals_distance_transforms(pairs):
+    defined = 0
+    for truth, mask in pairs:
+        labelled, width = truth != IGNORE, max(1, round(0.02 * np.hypot(*truth.shape)))
+        ours, theirs = (
+            labelled
+            & road
+            & (steps_to(np.pad(labelled & ~road, 1, constant_values=True))[1:-1, 1:-1] <= width)
+            for road in (mask == 1, truth == 1)
+        )
+        found, either = rims_overlap(mask, truth), (ours | theirs).sum()
+        assert found == (ours & theirs).sum() / either if either else math.isnan(found)
         defined += either > 0
-    assert defined > 200
-
-
-def in_rim(labels, truth, row, column):
-    """Whether a pixel is labelled road, and beside it is non-road or the end of the image."""
-    if truth[row, column] == IGNORE or labels[row, column] != 1:
-        return False
-    around = [(row + y, column + x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
-    if any(not (0 <= y < 8 and 0 <= x < 8) for y, x in around):
-        return True
-    return any(truth[place] != IGNORE and labels[place] == 0 for place in around)
+    assert defined > len(pairs) / 2
 
 
 def test_boundary_iou_is_undefined_without_road():
@@ -178,34 +170,18 @@ def near_edge(mask, truth, widths=TRIMAP):
     return contour(mask, truth, widths=widths)[2].tolist()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_trimap_equals_distance_transforms(seed):
-    truth, mask = wavy(seed)
-    to_road, to_other = (distance_transform_cdt(truth != value, "chessboard") for value in (1, 0))
-    expected = []
-    for width in TRIMAP:
-        near = (to_road <= width) & (to_other <= width) & (truth != IGNORE)
-        expected.append([int((near & (mask != truth)).sum()), int(near.sum())])
-    assert expected[0][0] > 0
-    assert near_edge(mask, truth) == expected
-
-
-def test_the_trimap_of_small_masks_equals_a_plain_loop():
-    draw = np.random.default_rng(1)
-    for _ in range(100):
-        truth = draw.choice(np.array([0, 1, IGNORE], np.uint8), (8, 8), p=[0.2, 0.1, 0.7])
-        mask = draw.integers(0, 2, (8, 8), np.uint8)
+@with_ignored
+def test_the_trimap_equals_distance_transforms(pairs):
+    wrong, widths = 0, sorted({1, 3, 4, *TRIMAP})
+    for truth, mask in pairs:
+        to_road, to_other = (steps_to(truth == value) for value in (1, 0))
         expected = []
-        for width in (1, 3, 4):
-            wrong = labelled = 0
-            for row, column in np.ndindex(8, 8):
-                top, left = max(row - width, 0), max(column - width, 0)
-                around = truth[top : row + width + 1, left : column + width + 1]
-                if truth[row, column] != IGNORE and {0, 1} <= set(around.ravel().tolist()):
-                    labelled += 1
-                    wrong += mask[row, column] != truth[row, column]
-            expected.append([wrong, labelled])
-        assert near_edge(mask, truth, (1, 3, 4)) == expected
+        for width in widths:
+            near = (to_road <= width) & (to_other <= width) & (truth != IGNORE)
+            expected.append([int((near & (mask != truth)).sum()), int(near.sum())])
+        assert near_edge(mask, truth, widths) == expected
+        wrong += expected[0][0]
+    assert wrong > len(pairs)
 
 
 # --- Over a drive

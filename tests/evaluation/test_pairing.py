@@ -10,7 +10,7 @@ from roadeval.evaluation.comparison.pairing import (
     truth_differs,
 )
 from roadeval.evaluation.tables import joined
-from tests.evaluation.making import CAMERA, a_drive, a_result, a_table, table_of
+from tests.evaluation.making import a_drive, a_result, a_table, table_of
 
 
 def of_drives(label, *drives):
@@ -51,19 +51,6 @@ def pairs_of(found):
 def test_drives_of_one_name_and_log_are_one_and_all_others_are_told(base, new, pairs, left):
     found = match_drives(of_drives("base", *base), of_drives("new", *new))
     assert (pairs_of(found), found[1]) == (pairs, left)
-
-
-def test_each_camera_of_a_drive_is_matched_with_its_own():
-    def a_rig(label, *cameras):
-        drives = [a_drive({("filtered", "post"): [1]}, camera=name) for name in cameras]
-        return a_result(label, *drives)
-
-    found, left = match_drives(a_rig("base", CAMERA, "/rear"), a_rig("new", "/rear", "/left"))
-    assert [(one.camera, other.camera) for one, other in found] == [("/rear", "/rear")]
-    assert left == [
-        "1 drive is left out of base (not in new): street",
-        "1 drive is left out of new (not in base): street",
-    ]
 
 
 def test_one_drive_of_several_is_found_where_only_that_is_compared():

@@ -5,13 +5,22 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
-from roadeval.data import Counts, Health, Role
+from roadeval.data import Counts, Health, Output, Packed, Role, StageResult, VariantResult
 from roadeval.evaluation import metrics, tables
 from roadeval.evaluation.score.frame import BlindPrior, judge
-from roadeval.evaluation.score.scoreboard import Scoreboard, evidence
+from roadeval.evaluation.score.scoreboard import Scoreboard, drive_effects, evidence
+from roadeval.evaluation.score.unlabelled import (
+    Unlabelled,
+    choose_frames,
+    doubts_of,
+    entropy,
+    sign_of,
+)
 from roadeval.evaluation.settings import EvaluationSettings
-from tests.evaluation.making import a_frame, a_variant, pixels, table_of
+from roadeval.evaluation.tables import joined
+from tests.evaluation.making import a_frame, a_table, a_variant, pixels, table_of
 from tests.results.making import KEY, frames_of
 
 TRUTH = pixels("##..", "##.?")
@@ -161,3 +170,149 @@ def test_stages_are_held_against_those_before_them():
 def test_without_windows_there_is_no_claim():
     assert evidence(tables.windows(table_of("frames", []), 10), 10) == {}
     assert evidence(pd.DataFrame(columns=["variant", "stage"]), 10) == {}
+
+
+def variant(name, mask, codes=None):
+    output = Output(mask=Packed.of(mask), probability=codes)
+    return VariantResult(name, (StageResult("post", output, 0.0),))
+
+
+def of_one_camera(*names):
+    return Scoreboard(("street", "/camera"), EvaluationSettings(), names, None)
+
+
+def seen(board, number, *variants, truth=None):
+    """Score and add a frame; return its doubts."""
+    frame = a_frame(truth, number=number)
+    role = Role.UNLABELLED if truth is None else Role.EVALUATED
+    return board.add(board.score(frame, role, variants))
+
+
+def test_entropy_is_scipy_s_on_every_fourth_pixel():
+    codes = np.random.default_rng(0).integers(0, 65536, (64, 96)).astype(np.uint16)
+    p = codes[::4, ::4].ravel() / 65535
+    assert entropy(codes) == pytest.approx(stats.entropy([p, 1 - p], base=2).mean(), abs=1e-6)
+
+
+def test_disagreement_is_the_mean_share_of_differing_pixels_over_the_others():
+    a, b, c = pixels("##.."), pixels("#..."), pixels("....")
+    first, second, third = doubts_of([variant("a", a), variant("b", b), variant("c", c)])
+    assert first.differs == {"b": 0.25, "c": 0.5}
+    assert [e.disagreement for e in (first, second, third)] == [0.375, 0.25, 0.375]
+    assert np.isnan([first.entropy, doubts_of([variant("a", a)])[0].disagreement]).all()
+
+
+def test_flicker_counts_pixels_that_change_and_begins_anew_after_a_gap():
+    board = of_one_camera("a")
+    flicker = [
+        seen(board, 0, variant("a", pixels("##.."))),
+        seen(board, 1, variant("a", pixels("#.#."))),
+    ]
+    board.lose()
+    flicker += [seen(board, 3, variant("a", pixels("....")))]
+    seen(board, 4, variant("a", pixels("....")), truth=pixels("...."))
+    flicker += [seen(board, 5, variant("a", pixels("####")))]
+    found = [own[0].flicker for own in flicker]
+    assert found == pytest.approx([np.nan, 0.5, np.nan, np.nan], nan_ok=True)
+
+
+def test_frames_with_truth_and_training_frames_have_no_doubt():
+    board = of_one_camera("a")
+    assert seen(board, 0, variant("a", pixels("#...")), truth=pixels("#...")) == ()
+    found = board.score(a_frame(None, number=1), Role.TRAINING, (variant("a", pixels("#...")),))
+    assert found.doubts == ()
+
+
+def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
+    found = {}
+    for names in (("sure", "plain"), ("plain", "sure")):
+        board, codes = of_one_camera(*names), {"sure": np.full((1, 4), 20000, np.uint16)}
+        for number in range(2):
+            masks = {"sure": pixels("#..."), "plain": pixels("....")}
+            seen(board, number, *(variant(name, masks[name], codes.get(name)) for name in names))
+        found[names[0]] = sign_of(board.unlabelled.rows())
+    assert found == {"sure": "entropy", "plain": "disagreement"}
+    assert sign_of(Unlabelled().rows()) is None
+
+
+def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():
+    stamps = np.arange(900) * 10**9 // 30
+    random, ranked = choose_frames(stamps, np.linspace(1, 2, 900), 60, seed=0)
+    assert len(random) == len(ranked) == 30
+    places = np.sort(np.concatenate([random, ranked]))
+    beside = np.minimum(np.diff(places, prepend=-900), np.diff(places, append=1800))
+    assert beside[np.isin(places, ranked)].min() >= 7  # a quarter of the 30 frames of a second
+
+
+SETTINGS = EvaluationSettings()
+
+
+def effects_of(errors):
+    """The differences of a drive of one camera."""
+    return drive_effects(a_table(errors), SETTINGS)
+
+
+def of(*masks):
+    """What is subtracted from what: base, variant, stage, and whether both are final."""
+    effects = effects_of(dict.fromkeys(masks, [3] * 12))
+    return [(each.base, each.variant, each.stage, each.final) for each in effects]
+
+
+def test_the_filter_is_told_stage_by_stage_and_other_variants_by_their_final_mask():
+    stages = ("svm", "post")
+    pair = [(variant, stage) for variant in ("filtered", "unfiltered") for stage in stages]
+    assert of(*pair, ("net", "svm"), ("net", "post"), ("blind", "post")) == [
+        ("unfiltered", "filtered", "svm", False),
+        ("unfiltered", "filtered", "post", True),
+        ("unfiltered", "net", "post", True),
+        ("blind", "filtered", "post", True),
+        ("blind", "unfiltered", "post", True),
+        ("blind", "net", "post", True),
+    ]
+
+
+def test_final_masks_of_different_stages_are_subtracted():
+    assert of(("unfiltered", "svm"), ("filtered", "svm"), ("filtered", "smooth")) == [
+        ("unfiltered", "filtered", "svm", False),
+        ("unfiltered", "filtered", "smooth", True),
+    ]
+
+
+def test_what_was_tuned_is_held_against_its_method():
+    assert of(("net", "post"), ("net_tuned", "post"), ("other", "post")) == [
+        ("net", "net_tuned", "post", True)
+    ]
+
+
+def test_a_difference_is_the_variant_minus_the_base_on_the_frames_that_both_have():
+    pair = {("filtered", "post"): [10, 10, 90], ("unfiltered", "post"): [7, 9]}
+    (effect,) = effects_of(pair)
+    found = effect.rates["ERR"]
+    assert (found.units, found.mean) == (2, pytest.approx(0.02))
+    assert [*effect.rates] == ["ACC", "ERR", "FNR", "FPR"]
+
+
+def test_each_camera_counts_the_same_in_a_difference():
+    front = {("filtered", "post"): [12] * 30, ("unfiltered", "post"): [10] * 30}
+    rear = {("filtered", "post"): [14] * 10, ("unfiltered", "post"): [10] * 10}
+    rig = joined([a_table(front), a_table(rear, camera="/rear")])
+    (effect,) = drive_effects(rig, SETTINGS)
+    assert (effect.rates["ERR"].units, effect.rates["ERR"].mean) == (40, pytest.approx(0.03))
+
+
+def test_a_drive_without_frames_has_no_difference():
+    assert drive_effects(table_of("frames", []), SETTINGS) == []
+
+
+def test_final_masks_against_one_base_are_corrected_together():
+    rng = np.random.default_rng(2)
+    names = [("filtered", "svm"), ("filtered", "post"), ("unfiltered", "svm")]
+    names += [("unfiltered", "post"), ("net", "post"), ("blind", "post")]
+    effects = effects_of({name: rng.integers(5, 20, 40).tolist() for name in names})
+    sizes = [(each.base, each.final, each.rates["ERR"].comparisons) for each in effects]
+    assert sizes == [
+        ("unfiltered", False, None),
+        *[("unfiltered", True, 2)] * 2,
+        *[("blind", True, 3)] * 3,
+    ]
+    assert {each.rates["FPR"].comparisons for each in effects} == {None}

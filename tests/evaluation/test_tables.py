@@ -95,7 +95,7 @@ def test_nothing_evaluated_is_nothing_in_every_table():
     assert tables.masks_of(NOTHING) == []
     assert tables.is_final(NOTHING).shape == (0,)
     assert len(tables.finals(NOTHING)) == len(tables.worst(NOTHING, 5)) == 0
-    assert len(tables.paired(NOTHING, NOTHING, ["drive", "frame"])) == 0
+    assert len(tables.pair_rows(NOTHING, NOTHING, ["drive", "frame"])) == 0
     assert len(tables.changes(NOTHING, *("filtered", "unfiltered"))) == 0
     assert len(tables.causes(NOTHING, "filtered")) == 0
     assert len(tables.joined([NOTHING, NOTHING])) == 0
@@ -133,7 +133,9 @@ def test_each_camera_and_each_drive_is_cut_by_itself():
     parts = [a_table({POST: [10] * 3}), a_table({POST: [20] * 3}, camera="/rear")]
     parts += [a_table({POST: [30] * 2}, drive="road")]
     rows = tables.windows(tables.joined(parts), 2)
-    found = {key: own["frames"].tolist() for key, own in tables.grouped(rows, ["drive", "camera"])}
+    found = {
+        key: own["frames"].tolist() for key, own in tables.group_rows(rows, ["drive", "camera"])
+    }
     assert [*found.values()] == [[2, 1], [2, 1], [2]]
 
 
@@ -171,7 +173,7 @@ def test_frames_are_paired_by_stamp_in_the_bases_order_and_equal_stamps_by_their
         pd.DataFrame({"stamp_ns": stamps, "place": range(len(stamps))})
         for stamps in ([9, 5, 7, 7, 1], [7, 9, 7, 7, 2])
     )
-    pairs = tables.paired(base, new, ["stamp_ns"])
+    pairs = tables.pair_rows(base, new, ["stamp_ns"])
     assert pairs["place_base"].tolist() == [0, 2, 3]
     assert pairs["place"].tolist() == [1, 0, 2]
 
@@ -209,7 +211,7 @@ def test_a_frame_without_a_rate_is_none_of_the_worst():
 def test_frames_that_changed_most_are_those_that_changed_at_all(harmed, places):
     stamps = np.arange(4) * 1_000_000_000
     pairs = pd.DataFrame({"stamp_ns": stamps, "change": [0, 0.1, 0.2, -0.1]})
-    assert tables.most_changed(pairs, 5, harmed=harmed).index.tolist() == places
+    assert tables.most_changed_frames(pairs, 5, harmed=harmed).index.tolist() == places
 
 
 def test_the_causes_of_an_error_add_up_to_it():
@@ -270,4 +272,4 @@ def test_a_perfect_stage_is_held_against_the_same_frames_as_they_are():
     ],
 )
 def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
-    assert tables.merged(chains) == order
+    assert tables.merge_names(chains) == order

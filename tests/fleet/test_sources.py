@@ -6,11 +6,20 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config.run import RunConfig
+from roadeval.config.run import RunConfig, configure
 from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
-from roadeval.fleet.drives import DriveEntry, find_drives, identity
+from roadeval.fleet.drives import (
+    DriveEntry,
+    FleetError,
+    deal,
+    entry_of,
+    find_drives,
+    groups_of,
+    identity,
+)
 from roadeval.geometry.settings import GroundSettings
+from roadeval.logs.container.records import MAGIC
 from roadeval.logs.settings import CameraSettings
 from tests.fixtures.elsewhere import split_bag, talker
 
@@ -195,3 +204,146 @@ def test_a_word_that_names_no_drive_is_an_error_of_one_line(folder, word, messag
     with pytest.raises(RoadevalError, match=message) as error:
         find_drives([word])
     assert "\n" not in str(error.value)
+
+
+DRIVES = {f"drive{k}": f"day{k // 3}" for k in range(30)}
+
+
+def test_drives_of_a_group_stay_together():
+    folds = deal(DRIVES, 4, seed=0)
+    for day in set(DRIVES.values()):
+        assert len({folds[drive] for drive, group in DRIVES.items() if group == day}) == 1
+
+
+def test_folds_have_the_same_number_of_groups_but_for_one():
+    folds = deal({f"d{k}": f"d{k}" for k in range(23)}, 5, seed=1)
+    sizes = [list(folds.values()).count(k) for k in range(5)]
+    assert sorted(sizes) == [4, 4, 5, 5, 5]
+
+
+def test_the_deal_depends_on_the_seed_and_not_on_the_order():
+    backwards = dict(reversed(DRIVES.items()))
+    assert deal(DRIVES, 3, seed=0) == deal(backwards, 3, seed=0)
+    assert deal(DRIVES, 3, seed=0) != deal(DRIVES, 3, seed=1)
+
+
+def test_fewer_groups_than_folds_are_refused():
+    with pytest.raises(FleetError, match=r"11 folds need as many drives .* there are 10"):
+        deal(DRIVES, 11, seed=0)
+
+
+# --- Copies of one log are of one group, whatever they are called ---------------------------------
+
+
+def drive(folder: Path, name: str, content: bytes, group: str | None = None):
+    path = folder / name
+    path.write_bytes(MAGIC + content)
+    return entry_of(str(path), group)
+
+
+def test_copies_share_a_group_and_logs_of_the_same_size_do_not(tmp_path):
+    one, other = drive(tmp_path, "a.mcap", b"same"), drive(tmp_path, "b.mcap", b"same")
+    alone = drive(tmp_path, "c.mcap", b"else")
+    assert groups_of([one, other, alone]) == {one.id: one.id, other.id: one.id, alone.id: alone.id}
+
+
+def test_groups_that_hold_copies_of_one_log_are_one(tmp_path):
+    entries = [
+        drive(tmp_path, "a.mcap", b"same", "monday"),
+        drive(tmp_path, "b.mcap", b"b", "monday"),
+        drive(tmp_path, "c.mcap", b"same", "tuesday"),
+        drive(tmp_path, "d.mcap", b"dd", "tuesday"),
+        drive(tmp_path, "e.mcap", b"eee", "friday"),
+    ]
+    assert [*groups_of(entries).values()] == [*["monday"] * 4, "friday"]
+
+
+def test_what_cannot_be_read_and_what_lies_elsewhere_stands_alone(tmp_path):
+    entries = [
+        entry_of(str(tmp_path / "missing.mcap")),
+        entry_of("https://example.org/a.mcap"),
+        entry_of("https://example.org/b.mcap"),
+    ]
+    assert groups_of(entries) == {entry.id: entry.id for entry in entries}
+
+
+TOML = """\
+[[drives]]
+path = "a.mcap"
+group = 7
+tags = { weather = "rain", lanes = 2, wet = true, slope = 0.5 }
+topics = { image = "/left", masks = { net = "/net" } }
+labels = { road = [3, 7] }
+frames = { start = "10", every = 5 }
+
+[[drives]]
+path = "b.mcap"
+"""
+
+
+@pytest.fixture
+def entries(tmp_path):
+    """Find the drives of a manifest from its text."""
+    for name in "ab":
+        (tmp_path / f"{name}.mcap").touch()
+
+    def read(text):
+        path = tmp_path / "fleet.toml"
+        path.write_text(text)
+        return find_drives([str(path)])
+
+    return read
+
+
+def test_a_manifest_says_more_of_each_drive(entries, tmp_path):
+    first, second = entries(TOML)
+    assert (first.path, first.group) == (tmp_path / "a.mcap", "7")
+    assert first.tags == {"weather": "rain", "lanes": "2", "wet": "true", "slope": "0.5"}
+    assert (second.path, second.known) == (tmp_path / "b.mcap", (None, {}, {}))
+
+
+def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_a_whole(entries):
+    run = configure(
+        {
+            "topics": {"truth": "/truth"},
+            "labels": {"road": [1], "ignore": [2]},
+            "frames": {"every": 2, "end": "20"},
+        }
+    )
+    first, second = (each.config(run) for each in entries(TOML))
+    assert (first.topics.image, first.topics.masks) == ("/left", {"net": "/net"})
+    assert first.topics.truth == "/truth"
+    assert (first.labels.road, first.labels.ignore) == ((3, 7), ())
+    assert (first.frames.start, first.frames.every, first.frames.end) == ("10", 5, "20")
+    assert second == run
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("drives = [", r"fleet\.toml: cannot be read as TOML"),
+        ("", r"fleet\.toml: a manifest has \[\[drives\]\], one for each drive"),
+        ("drives = 3", "one for each drive, and nothing else"),
+        ("[frames]\nevery = 2", "one for each drive, and nothing else"),
+        ("drives = [3]", "number 1: drives: must be a table"),
+        ("[[drives]]\ngroup = 'a'", "number 1: path must name a log"),
+        (
+            "[[drives]]\npath = 'a'\nwether = 'x'",
+            "wether: there is no such setting; choose frames, ground, group",
+        ),
+        ("[[drives]]\npath = 'a'\ntags = 'x'", "tags: must be a table"),
+        ("[[drives]]\npath = 'a'\ntags = { b = [1] }", r"tags\.b: must be text, a number, true or"),
+        ("[[drives]]\npath = 'a'\ntags = { 'b c' = 1 }", "a tag's name is made of letters"),
+        ("[[drives]]\npath = 'a'\nframes = { evry = 3 }", r"frames\.evry: there is no such"),
+        ("[[drives]]\npath = 'a'\nframes = { every = 0 }", r"frames\.every: must be at least 1"),
+        ("[[drives]]\npath = 'a'\nlabels = 3", r"labels: must be a table"),
+        ("[[drives]]\npath = 'a'\nlabels = {ignore = [3]}", r"labels\.ignore needs labels\.road"),
+        ("[[drives]]\npath = 'a'\ntraining = {}", "training: there is no such setting"),
+        ('[[drives]]\npath = "a\\u0000"', "holds a zero byte"),
+    ],
+)
+def test_a_wrong_manifest_is_named_in_one_line(entries, text, message):
+    with pytest.raises(RoadevalError, match=message) as error:
+        entries(text)
+    assert "\n" not in str(error.value)
+    assert "fleet.toml" in str(error.value)

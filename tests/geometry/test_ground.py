@@ -288,12 +288,35 @@ def test_a_file_with_a_number_that_no_camera_has_is_refused(name: str, content: 
         configure({"ground": {name: content}})
 
 
+@pytest.mark.parametrize(
+    ("name", "last", "beyond"),
+    [
+        ("height", 0.01, 0.009),
+        ("height", 1000, 1001),
+        ("pitch", 89.9, 90),
+        ("pitch", -89.9, -90),
+        ("roll", -180, -181),
+        ("roll", 180, 181),
+        ("fov", 0.5, 0.4),
+        ("fov", 175, 176),
+        ("focal", [1e6, 1e6], [1.0, 1.0, 1.0]),
+        ("centre", [-1e6, 0.0], [-1_000_001.0, 0.0]),
+        ("centre", [0.0, 1e6], [0.0, 1_000_001.0]),
+        ("size", [65_536, 1], [65_537, 1]),
+    ],
+)
+def test_a_number_is_taken_up_to_its_limit(name: str, last: object, beyond: object):
+    configure({"ground": {name: last}})
+    with pytest.raises(ConfigError, match=rf"ground\.{name}"):
+        configure({"ground": {name: beyond}})
+
+
 def test_a_plan_shows_the_pixel_in_which_each_cell_lies():
     ground = made()
     plan = Plan(ground, 6, 46, 20, 0.5)
     image = np.arange(SIZE[0] * SIZE[1]).reshape(SIZE[::-1])
     picture = plan.picture(image, nothing=-5)
-    for row, column in ((0, 0), (10, 20), (79, 19), (79, 0), (40, 39)):
+    for row, column in np.ndindex(picture.shape):
         place = 46 - 0.25 - 0.5 * row, 10 - 0.25 - 0.5 * column
         x, y = np.rint(ground.pixels(np.array([place]))[0])
         inside = 0 <= x < SIZE[0] and 0 <= y < SIZE[1]

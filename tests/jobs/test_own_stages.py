@@ -10,7 +10,7 @@ import pytest
 
 import roadeval
 from roadeval.cli.app import main
-from roadeval.jobs.run.prepared import asked
+from roadeval.jobs.run.prepared import settings_digest
 from roadeval.pipeline import stages
 from tests.jobs.making import settings, write_log
 from tests.pipeline import somebody
@@ -94,11 +94,11 @@ def test_results_tell_the_code_and_are_known_by_it(drive, tmp_path, monkeypatch)
     assert told["sha256"] == hashlib.sha256(Path(somebody.__file__).read_bytes()).hexdigest()
 
     def known_by(text):
-        stages._somebodys.cache_clear()
+        stages.import_stage.cache_clear()
         (tmp_path / "changing.py").write_text(text)
         sys.modules.pop("changing", None)
         importlib.invalidate_caches()
-        return asked(settings(chain=["changing:road", "post"]), "")
+        return settings_digest(settings(chain=["changing:road", "post"]), "")
 
     monkeypatch.syspath_prepend(tmp_path)
     one = "def road(image): return image[..., 0] > 1\n"

@@ -8,6 +8,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
+from roadeval.jobs.run import prepared
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LogConfig, TopicSettings
 from roadeval.report import figures as drawn
@@ -224,3 +225,113 @@ def test_damage_that_costs_no_message_is_a_warning(tmp_path):
     found = roadeval.replay(path, settings(jobs=1), save=tmp_path / "o.rrd", reports=tmp_path / "o")
     assert any("another log begins here" in each for each in found.warnings)
     assert not found.losses
+
+
+@pytest.fixture(scope="module")
+def a_log(tmp_path_factory):
+    return write_log(tmp_path_factory.mktemp("a") / "drive.mcap")
+
+
+def of(path, **values):
+    with open_log(path) as log:
+        return prepared.identity(log, settings(**values))
+
+
+def test_two_drives_of_one_name_differ(a_log, tmp_path):
+    other = write_log(tmp_path / "drive.mcap", broken=3)
+    assert of(a_log) != of(other)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"every": 2},
+        {"record": "masks"},
+        {"preset": "robust"},
+        {"shadow": {"ring_width": 3}},
+        {"variants": {"wide": {"preset": "paper"}}},
+        {"train_frames": 5},
+        {"truth": "/truth/road"},
+    ],
+)
+def test_two_configurations_of_one_drive_differ(values, a_log):
+    assert of(a_log) != of(a_log, **values)
+
+
+def test_two_models_differ_and_one_is_the_same_wherever_it_lies(a_log, tmp_path):
+    one, moved, other = tmp_path / "1.model", tmp_path / "2.model", tmp_path / "3.model"
+    roadeval.train([a_log], one, settings(train_frames=4))
+    shutil.copy(one, moved)
+    roadeval.train([a_log], other, settings(train_frames=5))
+    assert of(a_log, model=one) == of(a_log, model=moved) != of(a_log, model=other)
+    assert of(a_log, model=one) != of(a_log)
+
+
+def test_two_versions_differ(a_log, monkeypatch):
+    before = of(a_log)
+    monkeypatch.setattr(prepared, "VERSION", "99.0")
+    assert of(a_log) != before
+
+
+def test_where_a_log_lies_how_many_threads_and_where_results_land_make_no_difference(
+    a_log, tmp_path
+):
+    shutil.copy(a_log, tmp_path / "drive.mcap")
+    places = {"output": {"save": "x.rrd", "reports": "y", "mcap": "z.mcap"}}
+    assert of(a_log) == of(tmp_path / "drive.mcap", jobs=3, **places)
+
+
+CODES = "labels = { road = [3] }"
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    """Two drives with the same frames: one truth is a 0/255 mask, one holds class ids."""
+    folder = tmp_path_factory.mktemp("drives")
+    mask = write_log(folder / "mask.mcap")
+    return mask, write_log(folder / "ids.mcap", codes=(5, 3))
+
+
+def train(paths, folder, **options):
+    made = settings(train_frames=3, **options)
+    return roadeval.train(paths, folder / "m.model", made)
+
+
+def described(drive, tables):
+    """Write a manifest of a drive beside it."""
+    path = drive.with_suffix(".toml")
+    path.write_text(f'[[drives]]\npath = "{drive.name}"\n{tables}\n')
+    return path
+
+
+def test_a_drive_may_have_labels_of_its_own(drives, tmp_path):
+    model = train([drives[0], described(drives[1], CODES)], tmp_path)
+    assert model.warnings == ()
+    # Road and non-road are the same pixels in both, so either drive alone gives the same prior.
+    assert (model.prior == train(drives[:1], tmp_path).prior).all()
+
+
+def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
+    wrong = described(drives[0], "labels = { road = [4] }")
+    with pytest.raises(RoadevalError, match=r"mask.mcap: `labels.road` 4 does not occur .*0 255$"):
+        train([wrong, drives[1]], tmp_path, road=[3])
+
+
+def test_what_is_lost_of_a_log_is_told(tmp_path):
+    split = tmp_path / "split"
+    split.mkdir()
+    write_log(split / "split_0.mcap")
+    (split / "split_1.mcap").write_bytes(b"no log")
+    (split / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
+    losses = train([split], tmp_path).losses
+    assert [loss.partition(": ")[0] for loss in losses] == [
+        "split_1.mcap",
+        "/camera/image",
+        "/truth/road",
+    ]
+
+
+def test_a_drive_of_which_no_training_frame_can_be_decoded_is_refused(tmp_path):
+    broken = write_log(tmp_path / "broken.mcap", broken=0)
+    with pytest.raises(RoadevalError, match=r"broken.mcap: no training frame .*: frame 0: 8 bytes"):
+        train([broken], tmp_path, max_frames=1)

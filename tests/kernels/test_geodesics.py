@@ -22,19 +22,19 @@ def seeds_of(shape, *places):
 
 def dijkstra(cost, seeds):
     """Cheapest paths, pixel by pixel; ``cost`` is int64."""
-    found = np.full(cost.shape, plain.FAR)
+    lengths = np.full(cost.shape, plain.FAR)
     queue = [(0, int(y), int(x)) for y, x in np.argwhere(seeds)]
     while queue:
         length, y, x = heapq.heappop(queue)
-        if length >= found[y, x]:
+        if length >= lengths[y, x]:
             continue
-        found[y, x] = length
+        lengths[y, x] = length
         for dy, dx in np.argwhere(np.ones((3, 3))) - 1:
             to = y + dy, x + dx
             if (dy or dx) and 0 <= to[0] < cost.shape[0] and 0 <= to[1] < cost.shape[1]:
                 step = plain.ASLANT if dy and dx else plain.STRAIGHT
                 heapq.heappush(queue, (length + step * int(cost[y, x] + cost[to]), *to))
-    return found
+    return lengths
 
 
 def test_without_seeds_everything_is_far():
@@ -56,8 +56,8 @@ def test_rounds_enough_find_the_cheapest_paths(seed):
     cost = rng.choice(np.array([1, 5, 400], np.uint16), (20, 30))
     seeds = (rng.random(cost.shape) < 0.01).astype(np.uint8)
     seeds[10, 10] = 1
-    found = KERNELS.geodesics(cost, seeds, AMPLE)
-    np.testing.assert_array_equal(found, dijkstra(cost.astype(np.int64), seeds))
+    lengths = KERNELS.geodesics(cost, seeds, AMPLE)
+    np.testing.assert_array_equal(lengths, dijkstra(cost.astype(np.int64), seeds))
 
 
 def test_fewer_rounds_never_make_a_path_cheaper():

@@ -10,22 +10,22 @@ compiled = pytest.importorskip(
 )
 ALL = 0xFFFFFFFF
 GREATEST = 1e15
-"""What no feature is above: a node that is not there."""
+"""Threshold of an unused node: no feature is above it."""
 
 
 def forest(*trees):
-    """Arrays of trees, each of ``(feature, threshold, kept)`` of its nodes and its leaves' values.
+    """Arrays of trees, each by its nodes' ``(feature, threshold, leaves)`` and its leaves' values.
 
     Nodes and leaves are filled up to 32.
     """
     shape = len(trees), plain.LEAVES
     feature, threshold = np.zeros(shape, np.int32), np.full(shape, GREATEST, np.float32)
-    kept, values = np.full(shape, ALL, np.uint32), np.zeros(shape, np.float32)
-    for tree, (nodes, leaves) in enumerate(trees):
+    leaves, values = np.full(shape, ALL, np.uint32), np.zeros(shape, np.float32)
+    for tree, (nodes, added) in enumerate(trees):
         for place, (which, least, left) in enumerate(nodes):
-            feature[tree, place], threshold[tree, place], kept[tree, place] = which, least, left
-        values[tree, : len(leaves)] = leaves
-    return feature, threshold, kept, values
+            feature[tree, place], threshold[tree, place], leaves[tree, place] = which, least, left
+        values[tree, : len(added)] = added
+    return feature, threshold, leaves, values
 
 
 # Above 0.5 in feature 0: the third leaf. Else above 2 in feature 1: the second. Else the first.
@@ -51,14 +51,14 @@ def test_the_twins_agree_on_any_number_of_pixels(pixels):
     features = rng.normal(size=(7, pixels)).astype(np.float32)
     feature = rng.integers(0, 7, (9, 32)).astype(np.int32)
     threshold, values = rng.normal(size=(2, 9, 32)).astype(np.float32)
-    kept = (rng.integers(0, 1 << 31, (9, 32)) | 1 << 31).astype(np.uint32)
-    given = features, feature, threshold, kept, values
-    np.testing.assert_array_equal(compiled.tree_sum(*given), plain.tree_sum(*given))
+    leaves = (rng.integers(0, 1 << 31, (9, 32)) | 1 << 31).astype(np.uint32)
+    arguments = features, feature, threshold, leaves, values
+    np.testing.assert_array_equal(compiled.tree_sum(*arguments), plain.tree_sum(*arguments))
 
 
 def test_arrays_that_do_not_fit_together_are_refused():
     features = np.zeros((2, 4), np.float32)
-    feature, threshold, kept, values = forest(TREE)
+    feature, threshold, leaves, values = forest(TREE)
     for wrong in [(feature[:, :4], threshold), (feature, threshold[:0])]:
         with pytest.raises(ValueError, match="shape"):
-            compiled.tree_sum(features, *map(np.ascontiguousarray, wrong), kept, values)
+            compiled.tree_sum(features, *map(np.ascontiguousarray, wrong), leaves, values)

@@ -44,15 +44,15 @@ def every_kernel(image, width):
     }
 
 
-def assert_same(found, twin, name=""):
+def assert_same(result, twin, name=""):
     if isinstance(twin, tuple):
-        for mine, its in zip(found, twin, strict=True):
+        for mine, its in zip(result, twin, strict=True):
             assert_same(mine, its, name)
     elif isinstance(twin, int):
-        assert found == twin, name
+        assert result == twin, name
     else:
-        assert (found.dtype, found.shape) == (twin.dtype, twin.shape), name
-        np.testing.assert_array_equal(found, twin, err_msg=name)
+        assert (result.dtype, result.shape) == (twin.dtype, twin.shape), name
+        np.testing.assert_array_equal(result, twin, err_msg=name)
 
 
 def assert_twins(image, width=1):
@@ -112,7 +112,7 @@ def test_an_array_of_another_kind_is_refused(mask):
 def test_arrays_that_do_not_fit_together_are_refused():
     plane, more = np.zeros((4, 70), np.uint8), np.zeros((5, 70), np.uint8)
     runs, bits = np.zeros((0, 4), np.int32), np.zeros((4, 1), np.uint64)
-    whole = np.zeros((4, 2), np.uint64)
+    words = np.zeros((4, 2), np.uint64)
     image, road = np.zeros((4, 70, 3), np.uint8), np.zeros(1 << 18, np.uint64)
     wide, identity = np.zeros((2, 4)), np.eye(3)
     refused = [
@@ -120,7 +120,7 @@ def test_arrays_that_do_not_fit_together_are_refused():
         lambda: fast.mahalanobis((plane, plane, plane), np.zeros(2), identity, 1.0),
         lambda: fast.mahalanobis((plane, plane, plane), np.zeros(3), identity[:2], 1.0),
         lambda: fast.look_up_colours((plane, plane, plane), road[:-1]),
-        lambda: fast.ring_sums((plane, plane, plane), runs, whole[:3], 1, 1),
+        lambda: fast.ring_sums((plane, plane, plane), runs, words[:3], 1, 1),
         lambda: fast.transfer(image, runs, wide, wide, wide),
         lambda: fast.run_sums((plane, plane, more), runs, 1),
         lambda: fast.ring_sums((plane, plane, more), runs, bits, 1, 1),
@@ -128,7 +128,7 @@ def test_arrays_that_do_not_fit_together_are_refused():
         lambda: fast.dilate(bits, np.array([1]), 70),
         lambda: fast.erode(bits, np.array([1]), 70),
         lambda: fast.keep_region(bits, 70),
-        lambda: fast.count_bits(bits, whole, whole),
+        lambda: fast.count_bits(bits, words, words),
         lambda: fast.transfer(
             np.zeros((4, 70, 3), np.uint8),
             runs,
@@ -162,8 +162,8 @@ def test_every_component_has_its_own_transfer_whether_it_is_tabulated_or_not():
     labels = np.repeat(np.repeat([[1, 2, 3]], [20, 10, 20], axis=1), 20, axis=0).astype(np.int32)
     assert (np.bincount(labels.ravel())[1:] > fast.TABLED).tolist() == [True, False, True]
     source, target = RNG.uniform(0, 255, (2, 4, 3))
-    given = image, plain.label_runs(labels), source, target, RNG.uniform(0.5, 2, (4, 3))
-    assert_same(fast.transfer(*given), plain.transfer(*given))
+    arguments = image, plain.label_runs(labels), source, target, RNG.uniform(0.5, 2, (4, 3))
+    assert_same(fast.transfer(*arguments), plain.transfer(*arguments))
 
 
 @pytest.mark.parametrize("module", [fast, plain])
@@ -175,11 +175,11 @@ def test_sums_do_not_wrap_at_8_bits(module):
 
 
 def test_every_kernel_has_a_twin():
-    own = (f for f in vars(plain).values() if isfunction(f) and f.__module__ == plain.__name__)
-    twins = {f.__name__: f for f in own if not f.__name__.startswith("_")}
+    defined = (f for f in vars(plain).values() if isfunction(f) and f.__module__ == plain.__name__)
+    twins = {f.__name__: f for f in defined if not f.__name__.startswith("_")}
     assert set(twins) - set(fast.LOOPS) == {"label_runs", "paint", "ring_pairs"}
     for name in fast.LOOPS:
-        loop, twin = (signature(each).parameters for each in (getattr(fast, name), twins[name]))
+        loop, twin = (signature(kernel).parameters for kernel in (getattr(fast, name), twins[name]))
         assert [*loop] == [*twin]
 
 
@@ -215,8 +215,8 @@ def test_kernels_of_masks_agree_about_the_end_of_a_word(width, share):
     mask = (np.random.default_rng(width).random((9, width)) < share).astype(np.uint8)
     packed = pack(mask)
     for connectivity in (4, 8):
-        given = packed, width, connectivity
-        assert_same(fast.components(*given), plain.components(*given), "components")
+        arguments = packed, width, connectivity
+        assert_same(fast.components(*arguments), plain.components(*arguments), "components")
     assert_same(fast.keep_region(packed, width), plain.keep_region(packed, width), "keep_region")
     assert_same(fast.fill_holes(packed, width), plain.fill_holes(packed, width), "fill_holes")
     for reach in map(np.array, ([0], [1], [3, 1], [64, 63], [65, 2, 0], [130])):
@@ -233,11 +233,11 @@ def test_rings_are_summed_up_alike_across_words(width, reach):
     mask = (cv2.blur(image[..., 1], (5, 5)) < 110).astype(np.uint8)
     runs, count = plain.components(pack(mask), width, 8)
     ring = shadow.buffer_ring(Packed.of(mask), reach).bits
-    given = cv2.split(image), runs, ring, count + 1, reach
-    sums = fast.ring_sums(*given)
+    arguments = cv2.split(image), runs, ring, count + 1, reach
+    sums = fast.ring_sums(*arguments)
     assert count > 3
     assert (sums[1:, 0] > 0).all()
-    assert_same(sums, plain.ring_sums(*given), "ring_sums")
+    assert_same(sums, plain.ring_sums(*arguments), "ring_sums")
 
 
 @pytest.mark.parametrize("view", [np.asfortranarray, lambda m: m[::-1], lambda m: m[:, ::2]])
@@ -259,17 +259,17 @@ def test_labels_of_three_bits_and_an_element_without_rows_are_refused():
 @settings(max_examples=200)
 def test_masks_change_by_an_element_alike_and_stay_in_the_image(mask, least, rows, name):
     reach = np.array([least + rows - row for row in range(rows + 1)])
-    given = pack(mask), reach, mask.shape[1]
-    changed = getattr(fast, name)(*given)
-    np.testing.assert_array_equal(changed, getattr(plain, name)(*given))
+    arguments = pack(mask), reach, mask.shape[1]
+    changed = getattr(fast, name)(*arguments)
+    np.testing.assert_array_equal(changed, getattr(plain, name)(*arguments))
     np.testing.assert_array_equal(changed, pack(unpack(changed, mask.shape[1])))
 
 
 @given(masks(most=30), st.sampled_from([1, 40, 65_535]), st.integers(0, 4), st.integers(0, 10**6))
 def test_paths_are_measured_alike(seeds, greatest, rounds, seed):
     cost = np.random.default_rng(seed).integers(0, greatest, seeds.shape, np.uint16, endpoint=True)
-    given = cost, seeds, rounds
-    assert_same(fast.geodesics(*given), plain.geodesics(*given))
+    arguments = cost, seeds, rounds
+    assert_same(fast.geodesics(*arguments), plain.geodesics(*arguments))
 
 
 @given(st.integers(0, 3), st.integers(1, 3), st.integers(1, 4), st.integers(1, 200))
@@ -279,10 +279,10 @@ def test_bits_are_counted_alike(count, classes, regions, words):
         rng.integers(0, 1 << 64, (rows, words), dtype=np.uint64)
         for rows in (count, classes, regions)
     ]
-    found, twin = fast.count_bits(*arguments), plain.count_bits(*arguments)
-    assert found.dtype == twin.dtype == np.int64
-    np.testing.assert_array_equal(found, twin)
-    assert found.shape == (count, classes, regions)
+    result, twin = fast.count_bits(*arguments), plain.count_bits(*arguments)
+    assert result.dtype == twin.dtype == np.int64
+    np.testing.assert_array_equal(result, twin)
+    assert result.shape == (count, classes, regions)
 
 
 def test_bits_of_full_words_are_counted():

@@ -9,6 +9,7 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from roadeval.logs import log
+from roadeval.logs.container import file, records
 from roadeval.logs.container.records import FileBytes
 from roadeval.logs.log import describe, open_log
 
@@ -16,17 +17,19 @@ CHUNK = 100_000
 FRAMES = 40
 
 
-def write(path: Path, *, chunks: bool = True, crcs: bool = True, seed: int = 0) -> Path:
+def write(
+    path: Path, *, size: int = CHUNK, frames: int = FRAMES, chunks=True, crcs=True, seed: int = 0
+) -> Path:
     """Write a log of noise, a chunk each message, with data that a checksum alone can tell."""
     noise = np.random.default_rng(seed)
-    options = {"chunk_size": CHUNK, "compression": CompressionType.NONE}
+    options = {"chunk_size": size, "compression": CompressionType.NONE}
     with path.open("wb") as file:
         writer = Writer(file, **options, use_chunking=chunks, enable_crcs=crcs)
         writer.start()
         schema = writer.register_schema("Noise", "ros2msg", b"uint8[] data")
         channel = writer.register_channel("/noise", "cdr", schema)
-        for number in range(FRAMES):
-            writer.add_message(channel, number * 10**8, noise.bytes(CHUNK), number * 10**8)
+        for number in range(frames):
+            writer.add_message(channel, number * 10**8, noise.bytes(size), number * 10**8)
         writer.finish()
     return path
 
@@ -79,14 +82,15 @@ def test_a_byte_that_changed_inside_a_chunk_is_found_by_verifying(noise, tmp_pat
 
 def test_of_a_large_log_the_messages_are_not_read_unless_asked(noise, monkeypatch):
     read = []
-    original = FileBytes.__getitem__
 
-    def counted(self, part):
-        found = original(self, part)
-        read.append(len(found))
-        return found
+    class Counted(FileBytes):
+        def __getitem__(self, part):
+            found = super().__getitem__(part)
+            read.append(len(found))
+            return found
 
-    monkeypatch.setattr(FileBytes, "__getitem__", counted)
+    for module in (records, file):
+        monkeypatch.setattr(module, "FileBytes", Counted)
     monkeypatch.setattr(log, "SMALL", CHUNK)
     found = describe(noise)
     assert (found.verified, found.sha256) == (False, None)

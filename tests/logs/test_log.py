@@ -2,20 +2,24 @@
 
 import random
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
+import cv2
+import numpy as np
+import numpy.typing as npt
 import pytest
 from mcap.writer import CompressionType
 
 from roadeval.logs.container import records
-from roadeval.logs.errors import LogError
+from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.frames import LoggedFrame, Selection
 from roadeval.logs.log import Log, open_log
-from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings
+from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings, parse_time
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
-from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
+from tests.fixtures.flavours import FLAVOURS, file_fields, in_json, scenes
+from tests.fixtures.shared import both, shared
+from tests.logs.making import SECOND, compressed, drive, frames, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789
 STAMPS = [START + i * SECOND // 10 for i in range(10)]
@@ -88,13 +92,13 @@ def test_chunks_too_big_for_memory_are_read_all_the_same(tmp_path, kind, monkeyp
 
 
 @pytest.mark.parametrize("stamp", [2**63 - 1, 2**63, 10**40, -(10**40)])
-def test_a_stamp_beyond_all_clocks_cannot_be_read(tmp_path, monkeypatch, stamp):
-    path = ros2_log(tmp_path / "drive.mcap", [("/cam", 1, compressed(1, jpeg(grey(9))))])
-    with open_log(path) as log:
-        camera = log.readers["/cam"]
-        monkeypatch.setattr(
-            camera, "_decoder", lambda _: SimpleNamespace(stamp=lambda _data: stamp)
-        )
+def test_a_stamp_beyond_all_clocks_cannot_be_read(tmp_path, stamp):
+    sec, nsec = divmod(stamp, SECOND)
+    log = in_json(("foxglove.CompressedImage", "jsonschema", b"{}"),
+                  lambda _: {"timestamp": {"sec": sec, "nsec": nsec}}, file_fields)  # fmt: skip
+    (tmp_path / "drive.mcap").write_bytes(log.bytes())
+    with open_log(tmp_path / "drive.mcap") as log:
+        (camera,) = log.readers.values()
         assert camera.stamp(0) == (stamp if stamp == 2**63 - 1 else UNREADABLE)
 
 
@@ -255,3 +259,93 @@ def test_a_label_under_several_stamps_is_told(tmp_path: Path, apart: int, repeat
     _, frames = read(ros2_log(tmp_path / "a.mcap", messages))
     told = [note for note in frames[-1].accounting.notes if "labels repeat" in note]
     assert [note.split(" labels")[0] for note in told] == [f"{repeated} of the 12"] * (repeated > 0)
+
+
+SECOND = 1_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("text", "ns", "relative"),
+    [
+        ("2.5", 2_500_000_000, True),
+        ("90", 90 * SECOND, True),
+        (".25", 250_000_000, True),
+        ("0", 0, True),
+        ("12s", 12 * SECOND, True),
+        ("12ns", 12, False),
+        ("1700000000123456789", 1_700_000_000_123_456_789, False),
+        ("2.123456789", 2_123_456_789, True),
+        ("1970-01-01T00:00:01.000000005Z", SECOND + 5, False),
+        ("2023-11-14T23:13:20+01:00", 1_700_000_000 * SECOND, False),
+    ],
+)
+def test_a_time_is_read_to_the_nanosecond(text: str, ns: int, relative: bool) -> None:
+    assert parse_time(text) == ns
+    assert parse_time(text, start_ns=7) == ns + 7 * relative
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        ".",
+        "9" * 5_000,
+        "9" * 5_000 + ".5",
+        "9" * 5_000 + "ns",
+        "soon",
+        "-3",
+        "1e9",
+        "2023-11-14",
+        "2023-13-01T00:00:00Z",
+    ],
+)
+def test_anything_else_is_refused(text: str) -> None:
+    with pytest.raises(LogError, match="is no time"):
+        parse_time(text)
+
+
+Rgb = npt.NDArray[np.uint8]
+
+REFUSED = {
+    "ros2_CompressedImage_compressedDepth": "it holds depth",
+    "ros2_Image_bgr8_shortdata": r"(5084|56600) bytes of pixels where (5184|57600) are needed",
+}
+
+
+def cases(*shows: str) -> pytest.MarkDecorator:
+    names = [f"{name}.mcap" for name, flavour in FLAVOURS.items() if flavour.shows in shows]
+    return pytest.mark.parametrize("log", both("flavours", *names), indirect=True)
+
+
+def expected(log: Path, *, grey: bool) -> list[Rgb]:
+    """Return the frames that a log was made from: those beside it, or ours."""
+    beside = sorted(log.parent.glob("expected_*.png"))
+    found = [cv2.imread(str(path))[..., ::-1] for path in beside] if beside else scenes()
+    if not grey:
+        return found
+    return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)[..., None].repeat(3, axis=2) for rgb in found]
+
+
+@pytest.mark.parametrize("folder", shared("mcap", "flavours"))
+def test_every_shared_flavour_is_among_ours(folder: Path) -> None:
+    assert {path.stem for path in folder.glob("*.mcap")} <= set(FLAVOURS)
+
+
+@cases("colour", "grey")
+def test_frames_are_those_expected(log: Path) -> None:
+    flavour, found = FLAVOURS[log.stem], frames(log)
+    assert len(found) == 5
+    for frame, wanted in zip(found, expected(log, grey=flavour.shows == "grey"), strict=True):
+        assert np.abs(frame.image.astype(int) - wanted).mean() <= flavour.error
+
+
+@cases("colour", "grey", "video")
+def test_the_cameras_own_name_is_read(log: Path) -> None:
+    with open_log(log) as opened:
+        assert all(topic.frame_id in {"camera", "cam"} for topic in opened.topics if topic.is_image)
+
+
+@cases("nothing")
+def test_what_is_no_image_is_called_by_its_name(log: Path) -> None:
+    with pytest.raises((LogError, FrameError), match=REFUSED[log.stem]):
+        frames(log)

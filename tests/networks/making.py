@@ -121,7 +121,7 @@ def without_end(condition: str) -> onnx.NodeProto:
 
 
 def scores(values: dict[str, np.ndarray], planes: np.ndarray) -> np.ndarray:
-    """What the network makes of ``(3, H, W)``: ``(C, H / 2, W / 2)``."""
+    """Return the network's output for ``(3, H, W)``: ``(C, H / 2, W / 2)``."""
     wide = np.pad(planes, ((0, 0), (1, 1), (1, 1)))
     rows, columns = (size // 2 for size in planes.shape[1:])
     hidden = np.zeros((4, rows, columns))
@@ -136,14 +136,14 @@ def scores(values: dict[str, np.ndarray], planes: np.ndarray) -> np.ndarray:
 def balanced(image: np.ndarray, classes: int = 2) -> dict[str, np.ndarray]:
     """Weights by which half of an image of the input's size is road, the last class."""
     values = weights(classes)
-    found = scores(values, image.transpose(2, 0, 1) / 255)
-    others = found[:-1].max(axis=0) if classes > 1 else 0
-    values["b2"][-1] -= np.float32(np.median(found[-1] - others))
+    logits = scores(values, image.transpose(2, 0, 1) / 255)
+    others = logits[:-1].max(axis=0) if classes > 1 else 0
+    values["b2"][-1] -= np.float32(np.median(logits[-1] - others))
     return values
 
 
 def red_network(path: Path, size: tuple[int, int] = (32, 24), bias: float = -105.0) -> Path:
-    """Write a network that calls road what is redder than 105 of 255, or another bias."""
+    """Write a network that calls pixels road if their red is above 105 of 255, or another bias."""
     values = {
         "w": np.array([50, 0, 0], np.float32).reshape(1, 3, 1, 1),
         "b": np.array([50 * bias / 255], np.float32),

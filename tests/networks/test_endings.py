@@ -10,7 +10,7 @@ from onnx import TensorProto, helper
 from PIL import Image
 
 from roadeval.networks import NetSettings, Network, NetworkError, onnx_file
-from roadeval.networks.network import placed
+from roadeval.networks.network import fit_image
 from tests.networks.making import IMAGE, ROAD, SIZE, network, written
 
 RNG = np.random.default_rng(3)
@@ -100,8 +100,8 @@ def ended(path, ending, size=SIZE):
     *steps, last = ending.split("; ")
     for place, step in enumerate([*steps, last]):
         operator, *rest = step.split()
-        settings = dict(each.split("=") for each in rest if "=" in each)
-        more = [before if each == "@" else each for each in rest if "=" not in each]
+        settings = dict(part.split("=") for part in rest if "=" in part)
+        more = [before if part == "@" else part for part in rest if "=" not in part]
         after = ROAD if place == len(steps) else f"made {place}"
         numbers = {name: int(value) for name, value in settings.items()}
         nodes.append(helper.make_node(operator, [before, *more], [after], **numbers))
@@ -119,17 +119,17 @@ def opened_here_alone(monkeypatch):
 
 
 def road_of(path, ending, frame=FRAME, **settings):
-    found = Network.of(NetSettings(file=str(ended(path, ending)), **settings))
-    return found, found.road(frame).mask
+    net = Network.of(NetSettings(file=str(ended(path, ending)), **settings))
+    return net, net.road(frame).mask.pixels()
 
 
 @pytest.mark.parametrize("ending", [*PROBABILITIES, *LOGITS, *MAPS])
 def test_however_a_network_ends_its_road_is_the_same(ending, tmp_path):
     chosen = {"road": (MAPS[ending],)} if ending in MAPS else {}
-    found, mask = road_of(tmp_path / "n.onnx", ending, **chosen)
+    net, mask = road_of(tmp_path / "n.onnx", ending, **chosen)
     assert np.array_equal(mask, EXPECTED)
-    told = "probabilities" if ending in PROBABILITIES else "logits"
-    assert found.facts()["taken_for"] == ("classes" if ending in MAPS else told)
+    kind = "probabilities" if ending in PROBABILITIES else "logits"
+    assert net.facts()["taken_for"] == ("classes" if ending in MAPS else kind)
 
 
 def test_logits_are_interpolated_and_not_probabilities(tmp_path):
@@ -170,24 +170,26 @@ def by_ultralytics(path, names, **more):
 def test_of_a_single_class_ultralytics_writes_road_as_1(road, tmp_path):
     """``pred.gt(0)`` in ``SemanticSegmentationPredictor.postprocess``, and in its export."""
     path = ended(tmp_path / "n.onnx", f"{ONE}; Greater zero; Cast to={TensorProto.UINT8}")
-    found = Network.of(NetSettings(file=str(by_ultralytics(path, {0: "road"})), road=road))
-    assert np.array_equal(found.road(FRAME).mask, EXPECTED)
-    assert (found.settings.road, found.settings.resize) == ((1,), "letterbox")
+    net = Network.of(NetSettings(file=str(by_ultralytics(path, {0: "road"})), road=road))
+    assert np.array_equal(net.road(FRAME).mask.pixels(), EXPECTED)
+    assert (net.settings.road, net.settings.resize) == ((1,), "letterbox")
 
 
 def test_of_several_classes_ultralytics_names_say_which_is_road(tmp_path):
     path = by_ultralytics(ended(tmp_path / "n.onnx", MAP), {0: "car", 1: "road"})
-    assert np.array_equal(Network.of(NetSettings(file=str(path))).road(FRAME).mask, EXPECTED)
+    assert np.array_equal(
+        Network.of(NetSettings(file=str(path))).road(FRAME).mask.pixels(), EXPECTED
+    )
 
 
 def test_class_maps_of_ultralytics_come_back_as_its_own_do(tmp_path):
     """By ``torch.nn.functional.interpolate(mode="nearest")``: the pixel at or before the place."""
     path = by_ultralytics(ended(tmp_path / "n.onnx", MAP), {0: "car", 1: "road"})
     frame = cv2.resize(FRAME, (40, 30), interpolation=cv2.INTER_NEAREST)
-    found = Network.of(NetSettings(file=str(path)))
-    small = found.road(cv2.resize(frame, SIZE)).mask
+    net = Network.of(NetSettings(file=str(path)))
+    small = net.road(cv2.resize(frame, SIZE)).mask.pixels()
     rows, columns = (np.arange(n) * m // n for n, m in zip((30, 40), (12, 16), strict=True))
-    assert np.array_equal(found.road(frame).mask, small[np.ix_(rows, columns)])
+    assert np.array_equal(net.road(frame).mask.pixels(), small[np.ix_(rows, columns)])
 
 
 @pytest.mark.parametrize("size", [(37, 29), (16, 12), (9, 31), (80, 60)])
@@ -195,24 +197,24 @@ def test_an_antialiased_image_is_pillows(size):
     settings = NetSettings(file="n", size=size, resize="stretch", antialias=True)
     image = RNG.integers(0, 256, (47, 61, 3), np.uint8)
     expected = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR))
-    assert np.abs(placed(image, settings).astype(int) - expected).max() <= 1
+    assert np.abs(fit_image(image, settings).astype(int) - expected).max() <= 1
 
 
-@pytest.mark.parametrize("told", ["task", "boxes", "queries", "their lengths"])
-def test_a_network_that_finds_instances_is_called_so(told, tmp_path):
+@pytest.mark.parametrize("sign", ["task", "boxes", "queries", "their lengths"])
+def test_a_network_that_finds_instances_is_called_so(sign, tmp_path):
     path = network(tmp_path / "n.onnx", spare=True)
-    if told == "task":
+    if sign == "task":
         by_ultralytics(path, {0: "road"}, task="segment")
-    elif told == "their lengths":
+    elif sign == "their lengths":
         model = onnx.load(path)
-        found = helper.make_tensor_value_info("found", TensorProto.FLOAT, (1, 2, 48))
+        net = helper.make_tensor_value_info("found", TensorProto.FLOAT, (1, 2, 48))
         length = helper.make_node("Constant", [], ["lengths"], value_ints=[1, 2, 48])
         model.graph.node.extend([length, helper.make_node("Reshape", [ROAD, "lengths"], ["found"])])
-        model.graph.output.append(found)
+        model.graph.output.append(net)
         onnx.save(model, path)
     else:
         model = onnx.load(path)
-        model.graph.node[-1].output[0] = model.graph.output[0].name = f"pred_{told}"
+        model.graph.node[-1].output[0] = model.graph.output[0].name = f"pred_{sign}"
         onnx.save(model, path)
     with pytest.raises(NetworkError, match=r"finds instances.*semantic"):
         Network.of(NetSettings(file=str(path)))

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 import numpy as np
 import pytest
-from onnx import helper
+from onnx import TensorProto, helper
 
 from roadeval.data import CERTAIN
 from roadeval.networks import NetSettings, Network, NetworkError
@@ -13,7 +13,7 @@ from tests.networks.making import IMAGE as MADE
 from tests.networks.making import ROAD, SIZE, balanced, network, scores, without_end, written
 
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
-"""Of the input's size."""
+"""An image of the input's size."""
 FRAME = cv2.resize(IMAGE, (48, 30), interpolation=cv2.INTER_CUBIC)
 
 
@@ -35,9 +35,9 @@ def test_the_mask_is_the_one_that_numpy_computes(tmp_path):
     values = balanced(IMAGE)
     road = opened(network(tmp_path / "n.onnx", values=values)).road(IMAGE)
     expected = softmax(framed(scores(values, IMAGE.transpose(2, 0, 1) / 255)))[1]
-    assert np.abs(road.codes / CERTAIN - expected).max() < 1e-4
-    assert np.array_equal(road.mask, expected > 0.5)
-    assert 0.2 < road.mask.mean() < 0.8
+    assert np.abs(road.probability / CERTAIN - expected).max() < 1e-4
+    assert np.array_equal(road.mask.pixels(), expected > 0.5)
+    assert 0.2 < road.mask.pixels().mean() < 0.8
 
 
 @pytest.mark.parametrize("classes", [1, 2, 3])
@@ -46,10 +46,10 @@ def test_a_threshold_is_heeded_whatever_decides(classes, decide, tmp_path):
     path = network(tmp_path / "n.onnx", classes=classes, values=balanced(IMAGE, classes))
     if classes == 1 and decide == "argmax":
         return
-    found = opened(path, threshold=0.7, decide=decide, road=(classes - 1,))
-    road = found.road(FRAME)
-    assert found.settings.decide == (decide or "threshold")
-    assert np.array_equal(road.mask, road.codes > round(0.7 * CERTAIN))
+    reader = opened(path, threshold=0.7, decide=decide, road=(classes - 1,))
+    road = reader.road(FRAME)
+    assert reader.settings.decide == (decide or "threshold")
+    assert np.array_equal(road.mask.pixels(), road.probability > round(0.7 * CERTAIN))
 
 
 def test_a_threshold_on_classes_alone_is_refused(tmp_path):
@@ -61,8 +61,8 @@ def test_of_three_classes_road_is_where_it_beats_the_others(tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values)
     road = opened(path, road=(2,)).road(IMAGE)
-    found = framed(scores(values, IMAGE.transpose(2, 0, 1) / 255))
-    assert np.array_equal(road.mask, found.argmax(axis=0) == 2)
+    logits = framed(scores(values, IMAGE.transpose(2, 0, 1) / 255))
+    assert np.array_equal(road.mask.pixels(), logits.argmax(axis=0) == 2)
 
 
 @pytest.mark.parametrize("last", [None, "Softmax"])
@@ -70,10 +70,10 @@ def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values, last=last)
     road = opened(path, road=(0, 2), decide="threshold").road(IMAGE)
-    found = scores(values, IMAGE.transpose(2, 0, 1) / 255)
+    logits = scores(values, IMAGE.transpose(2, 0, 1) / 255)
     # Logits are interpolated where there are any.
-    shares = framed(softmax(found)) if last else softmax(framed(found))
-    assert np.abs(road.codes / CERTAIN - shares[0] - shares[2]).max() < 1e-4
+    shares = framed(softmax(logits)) if last else softmax(framed(logits))
+    assert np.abs(road.probability / CERTAIN - shares[0] - shares[2]).max() < 1e-4
     for codes, number in zip(road.by_class, (0, 2), strict=True):
         assert np.abs(codes / CERTAIN - shares[number]).max() < 1e-4
 
@@ -83,8 +83,8 @@ def test_classes_are_brought_to_the_frame_by_the_nearest_pixel(tmp_path):
     path = network(tmp_path / "n.onnx", values=values, last="ArgMax")
     road = opened(path, road=(1,)).road(IMAGE)
     expected = scores(values, IMAGE.transpose(2, 0, 1) / 255).argmax(axis=0).astype(np.uint8)
-    assert np.array_equal(road.mask, expected.repeat(2, axis=0).repeat(2, axis=1))
-    assert not road.graded
+    assert np.array_equal(road.mask.pixels(), expected.repeat(2, axis=0).repeat(2, axis=1))
+    assert road.probability is None
 
 
 def test_channels_scale_mean_and_deviation_are_applied_in_this_order(tmp_path):
@@ -95,7 +95,7 @@ def test_channels_scale_mean_and_deviation_are_applied_in_this_order(tmp_path):
     ).road(IMAGE)
     planes = ((IMAGE[..., ::-1] / 255 - mean) / deviation).transpose(2, 0, 1)
     expected = softmax(framed(scores(values, planes)))[1]
-    assert np.abs(road.codes / CERTAIN - expected).max() < 1e-4
+    assert np.abs(road.probability / CERTAIN - expected).max() < 1e-4
 
 
 @pytest.mark.parametrize("last", [None, "Sigmoid"])
@@ -104,7 +104,7 @@ def test_channels_can_come_last(last, tmp_path):
     first = network(tmp_path / "first.onnx", values=values, last=last)
     tail = network(tmp_path / "last.onnx", values=values, last=last, input_shape=(1, 12, 16, 3))
     one, other = (opened(path).road(FRAME) for path in (first, tail))
-    assert np.array_equal(one.mask, other.mask)
+    assert np.array_equal(one.mask.pixels(), other.mask.pixels())
     assert opened(tail).settings.layout == "NHWC"
 
 
@@ -114,29 +114,29 @@ def test_whole_numbers_are_handed_over_as_they_are(tmp_path):
     path = network(tmp_path / "n.onnx", values=values, dtype=2)
     road = opened(path).road(IMAGE)
     plain = opened(network(tmp_path / "p.onnx", values=balanced(IMAGE))).road(IMAGE)
-    assert np.abs(road.codes.astype(int) - plain.codes).max() <= 2
+    assert np.abs(road.probability.astype(int) - plain.probability).max() <= 2
 
 
 def test_a_letterbox_shows_the_whole_frame_and_no_more(tmp_path):
     path = network(tmp_path / "n.onnx", classes=1, values=_everywhere(1))
     tall = np.zeros((64, 20, 3), np.uint8)
-    assert opened(path, resize="letterbox").road(tall).mask.all()
+    assert opened(path, resize="letterbox").road(tall).mask.pixels().all()
 
 
 def test_of_several_outputs_road_is_what_one_of_them_calls_road(tmp_path):
     path = network(tmp_path / "n.onnx", values=balanced(IMAGE), spare=True)
     alone, other = (opened(path, outputs=(n,), road=(1,)) for n in ("road", "r1"))
     both = opened(path, outputs=("road", "r1"), road=(1,)).road(IMAGE)
-    expected = np.maximum(alone.road(IMAGE).codes, other.road(IMAGE).codes)
-    assert np.array_equal(both.codes, expected)
+    expected = np.maximum(alone.road(IMAGE).probability, other.road(IMAGE).probability)
+    assert np.array_equal(both.probability, expected)
 
 
 def test_threads_disturb_each_other_in_nothing(tmp_path):
-    found = opened(network(tmp_path / "n.onnx", values=balanced(IMAGE)))
+    reader = opened(network(tmp_path / "n.onnx", values=balanced(IMAGE)))
     frames = [np.roll(FRAME, shift, axis=1) for shift in range(24)]
-    alone = [found.road(frame).codes for frame in frames]
+    alone = [reader.road(frame).probability for frame in frames]
     with ThreadPoolExecutor(8) as pool:
-        together = [road.codes for road in pool.map(found.road, frames)]
+        together = [road.probability for road in pool.map(reader.road, frames)]
     assert all(map(np.array_equal, alone, together))
 
 
@@ -157,10 +157,10 @@ def test_numbers_that_are_none_are_an_error_of_a_network_with_a_softmax_inside(t
         helper.make_node("Softmax", ["unclean"], [ROAD], axis=1),
     ]
     path = _depending(tmp_path / "n.onnx", *nodes, high=np.float32(0.9), nan=np.float32(np.nan))
-    found = opened(path)
-    assert found.settings.activation == "none"
+    reader = opened(path)
+    assert reader.settings.activation == "none"
     with pytest.raises(NetworkError, match="NaN"):
-        found.road(FRAME)
+        reader.road(FRAME)
 
 
 def test_a_shape_that_depends_on_the_image_is_an_error(tmp_path):
@@ -192,3 +192,72 @@ def _everywhere(classes):
     values["w2"][:] = 0
     values["b2"][:] = 9.5
     return values
+
+
+def read(path, **settings) -> NetSettings:
+    return Network.of(NetSettings(file=str(path), **settings)).settings
+
+
+def refusal(path, **settings) -> str:
+    with pytest.raises(NetworkError) as caught:
+        read(path, **settings)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message
+
+
+def test_everything_is_stated_of_a_network_of_two_classes(tmp_path):
+    settings = read(network(tmp_path / "n.onnx"))
+    assert (settings.size, settings.layout, settings.channels) == ((16, 12), "NCHW", "rgb")
+    assert (settings.scale, settings.mean, settings.deviation) == (1 / 255, (0.0,), (1.0,))
+    assert (settings.outputs, settings.road, settings.decide) == (("road",), (1,), "argmax")
+    assert settings.activation == "softmax"
+
+
+def test_another_file_than_the_stated_one_is_refused(tmp_path):
+    settings = read(network(tmp_path / "n.onnx"))
+    network(tmp_path / "n.onnx", last="Softmax")
+    with pytest.raises(NetworkError, match="another network than was asked for"):
+        Network.of(settings)
+
+
+# --- What is asked for ----------------------------------------------------------------------------
+
+ASKED = {
+    "a size that it does not take": ({}, {"size": (20, 20)}, "takes no input of 20x20"),
+    "which of several outputs": ({"spare": True}, {}, "`net.outputs`"),
+    "an output that is not there": ({}, {"outputs": ("seg",)}, "has no output 'seg'"),
+    "which of three classes": (
+        {"classes": 3},
+        {},
+        "the classes of its 3 that are road by `net.road`",
+    ),
+    "which labels": ({"last": "ArgMax"}, {}, "`net.road`"),
+    "a class that is not there": ({}, {"road": (2,)}, "has no class 2, but 2 from 0"),
+    "one class beats no other": ({"classes": 1}, {"decide": "argmax"}, "`net.decide`"),
+    "four images at once": ({"input_shape": (4, 3, 12, 16)}, {}, "inputs: image"),
+    "five channels": ({"input_shape": (1, 5, 12, 16)}, {}, "inputs: image"),
+    "an operator that is not known": ({"operator": "Unheard"}, {}, "cannot run the network: "),
+    "an output that is no map": ({"last": "GlobalAveragePool"}, {}, "is no map of the image"),
+    "numbers that no image has": ({"dtype": TensorProto.INT64}, {}, "takes no image"),
+}
+
+
+@pytest.mark.parametrize("what", ASKED)
+def test_what_a_network_leaves_open_or_cannot_take_is_said(what, tmp_path):
+    made, settings, message = ASKED[what]
+    assert message in refusal(network(tmp_path / "n.onnx", **made), **settings)
+
+
+def test_a_size_that_is_left_open(tmp_path):
+    path = network(tmp_path / "n.onnx", input_shape=("n", 3, "h", "w"))
+    message = refusal(path)
+    assert "`net.size`" in message
+    assert "image float32 (?, 3, ?, ?)" in message
+    assert read(path, size=(32, 24)).size == (32, 24)
+
+
+def test_no_file(tmp_path):
+    with pytest.raises(NetworkError, match=r"net\.file"):
+        Network.of(NetSettings())

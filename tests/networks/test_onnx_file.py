@@ -1,4 +1,4 @@
-"""What an ONNX file tells of itself, and files that cannot be used."""
+"""Facts read from an ONNX file, and files that cannot be used."""
 
 import hashlib
 
@@ -20,10 +20,10 @@ def read(path):
 def refused(path) -> str:
     with pytest.raises(NetworkError) as caught:
         read(path)
-    said = str(caught.value)
-    assert said.startswith(f"{path}: ")
-    assert "\n" not in said
-    return said
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message
 
 
 def with_weights_beside(folder):
@@ -116,8 +116,8 @@ def test_a_loop_that_takes_ever_more_memory_is_ended(tmp_path):
     loop = without_end("yes")
     loop.output[:] = ["last", ROAD]
     loop.attribute[0].g.node.append(helper.make_node("Tile", ["was", "many"], ["kept"]))
-    kept = helper.make_tensor_value_info("kept", TensorProto.FLOAT, None)
-    loop.attribute[0].g.output.append(kept)
+    many = helper.make_tensor_value_info("kept", TensorProto.FLOAT, None)
+    loop.attribute[0].g.output.append(many)
     values = {"yes": True, "many": np.int64([1, 1, 20, 20])}
     path = written(tmp_path / "n.onnx", [loop], values)
     with pytest.raises(NetworkError, match="or more than 64 MiB to run"):
@@ -142,13 +142,13 @@ SIZES = {
 
 @pytest.mark.parametrize("what", SIZES)
 def test_an_output_that_is_too_large_or_no_map_is_refused(what, tmp_path):
-    shape, stated, said = SIZES[what]
+    shape, stated, message = SIZES[what]
     node = helper.make_node("ConstantOfShape", ["shape"], ["zeros"])
     keep = helper.make_node("ReduceMax", [IMAGE], ["most"], keepdims=0)
     nodes = [node, keep, helper.make_node("Add", ["zeros", "most"], [ROAD])]
     values = {"shape": np.int64([1, *shape])}
     path = written(tmp_path / "n.onnx", nodes, values, shape=[1, *shape] if stated else None)
-    assert said in refused(path)
+    assert message in refused(path)
 
 
 @pytest.mark.parametrize("operator", ["SequenceConstruct", "ArgMax to text"])
@@ -178,7 +178,7 @@ def test_a_file_that_is_no_onnx(content, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("there", "other", "said"),
+    ("there", "other", "message"),
     [
         (b"Relu", b"Rel\xb4", "a damaged one"),
         (b"strides", b"strid\xffs", "a damaged one"),
@@ -192,12 +192,12 @@ def test_a_file_that_is_no_onnx(content, tmp_path):
         "a stride of 0",
     ],
 )
-def test_a_file_that_is_damaged_inside(there, other, said, tmp_path):
+def test_a_file_that_is_damaged_inside(there, other, message, tmp_path):
     path = network(tmp_path / "n.onnx")
     content = path.read_bytes()
     assert there in content
     path.write_bytes(content.replace(there, other, 1))
-    assert said in refused(path)
+    assert message in refused(path)
 
 
 def test_a_file_that_ends_the_process_which_opens_it(tmp_path):

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 import sys
 import tomllib
 from importlib import import_module
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import roadeval
+from tests.jobs.making import write_log
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -64,6 +66,82 @@ def test_the_loop_is_held_against_the_floor(monkeypatch, capsys):
     words = ["--drive", str(ROOT / "recordings/demo.mcap"), "--parts", "replay", "stages"]
     words += ["--sizes", "96x72", "--frames", "12", "--repeat", "1", "--jobs", "1"]
     monkeypatch.setattr(sys, "argv", ["benchmarks", *words])
-    monkeypatch.setattr("benchmarks.__main__.TURNS", 1)
-    import_module("benchmarks.__main__").main()
+    benchmarks = import_module("benchmarks.__main__")
+    monkeypatch.setattr(benchmarks, "TURNS", 1)
+    benchmarks.main()
     assert "loop / floor" in capsys.readouterr().out
+
+
+IMPORTS = """
+import builtins, os, signal, sys
+from importlib import import_module
+from importlib.util import find_spec
+from pkgutil import walk_packages
+
+import roadeval
+
+def import_all():
+    for module in walk_packages(roadeval.__path__, "roadeval."):
+        if module.name not in left_out:
+            import_module(module.name)
+
+left_out = set()
+if find_spec("roadeval.kernels._loops") is None:
+    left_out.add("roadeval.kernels.compiled")
+
+# Other packages are made for the system that they are installed on: they come first, as they are.
+import_all()
+for name in [name for name in sys.modules if name.split(".")[0] == "roadeval"]:
+    del sys.modules[name]
+
+POSIX = {"fcntl", "grp", "posix", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"}
+MISSING = {
+    os: "fork forkpty getuid geteuid getgid getsid getpgid killpg setsid chown mkfifo nice wait "
+        "waitid wait3 wait4 posix_spawn sched_getaffinity sysconf uname getloadavg WNOHANG statvfs",
+    signal: "SIGALRM SIGCHLD SIGHUP SIGKILL SIGPIPE SIGQUIT SIGSTOP SIGTSTP SIGUSR1 SIGUSR2 "
+        "alarm pause setitimer sigwait pthread_sigmask pthread_kill siginterrupt",
+}
+for module, names in MISSING.items():
+    for name in names.split():
+        delattr(module, name)
+ordinary = builtins.__import__
+
+def without_posix(name, scope=None, *rest):
+    importer = (scope or {}).get("__name__", "")
+    if name in POSIX and importer.split(".")[0] == "roadeval":
+        raise ModuleNotFoundError(f"{importer} imports {name}")
+    return ordinary(name, scope, *rest)
+
+builtins.__import__ = without_posix
+import roadeval
+import_all()
+print(sum(name.startswith("roadeval.") for name in sys.modules))
+"""
+
+
+def test_no_module_needs_posix_to_be_imported():
+    run = subprocess.run(
+        [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert int(run.stdout) > 100
+
+
+def test_a_second_run_on_an_output_needs_nothing_of_posix(monkeypatch, tmp_path):
+    def run():
+        config = roadeval.configure({"output": {"record": "none"}})
+        return roadeval.replay(drive, config, reports=tmp_path / "reports").files
+
+    def no_library(*_, **__):
+        raise TypeError("bad argument type for built-in operation")
+
+    drive = write_log(tmp_path / "drive.mcap", numbers=range(12))
+    first = run()
+    (tmp_path / "reports" / "mine.txt").write_text("stays")
+    monkeypatch.delattr("os.chown")
+    monkeypatch.setattr("ctypes.CDLL", no_library)
+    monkeypatch.setattr("sys.platform", "win32")
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    assert run() == first
+    assert all(path.is_file() for path in first)
+    assert (tmp_path / "reports" / "mine.txt").read_text() == "stays"

@@ -1,9 +1,13 @@
 """The scripts in examples/ run as they stand."""
 
+import doctest
 import os
+import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 
 import pandas as pd
@@ -57,3 +61,61 @@ def _run(*words, **options):
         [sys.executable, *map(str, words)], capture_output=True, text=True, check=False, **options
     )
     assert done.returncode == 0, done.stderr
+
+
+HOME = Path(roadeval.__file__).parent
+SOURCES = {path: path.read_text() for path in sorted(HOME.rglob("*.py"))}
+OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(HOME.parent).with_suffix("").parts
+    return ".".join(part for part in parts if part != "__init__")
+
+
+MODULES = [name_of(path) for path, text in SOURCES.items() if ">>> " in text]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """What examples speak of: a drive, its recording, a model, and a fleet of that drive."""
+    folder = tmp_path_factory.mktemp("examples")
+    drive.write(folder / "drive.mcap", frames=14)
+    reports = folder / "reports"
+    roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
+    roadeval.train([folder / "drive.mcap"], folder / "city.model")
+    with ThreadPoolExecutor(1) as pool:
+        roadeval.replay_fleet([folder / "drive.mcap"], folder / "monday", executor=pool)
+    return folder
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_of_a_module_run(name, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    found = doctest.testmod(import_module(name), optionflags=OPTIONS)
+    assert found.attempted
+    assert not found.failed
+
+
+def test_no_example_is_skipped():
+    assert not [name_of(path) for path, text in SOURCES.items() if "doctest: +SKIP" in text]
+
+
+FINDINGS = sorted((Path(__file__).resolve().parents[2] / "findings").iterdir())
+
+
+@pytest.mark.parametrize("path", FINDINGS, ids=[path.stem for path in FINDINGS])
+def test_a_finding_installs_pinned_packages_in_a_folder_that_it_removes(path):
+    assert path.suffix == ".sh"
+    text = path.read_text()
+    header, _, script = text.partition("set -euo pipefail\n")
+    assert header.startswith("#!/usr/bin/env bash\n# ")
+    assert all(f"# {word}: " in header for word in ("Software", "Source"))
+    assert script.startswith("folder=$(mktemp -d)\ntrap 'rm -rf \"$folder\"' EXIT\n")
+    assert "python3 -m venv" in script
+    command = re.search(r"/pip\" install (.*?[^\\])\n", script, re.DOTALL)
+    packages = [word for word in command[1].split() if word[0] not in "-\\"]
+    assert packages
+    assert all("==" in package for package in packages)
+    assert "roadeval" not in text
+    assert not subprocess.run(["bash", "-n", path], check=False).returncode

@@ -88,8 +88,8 @@ def components(mask, width=1, connectivity=2):
     for region in regionprops(labels):
         top, left, bottom, right = region.bbox
         box = np.s_[max(top - width, 0) : bottom + width, max(left - width, 0) : right + width]
-        own = labels[box] == region.label
-        yield box, own, dilate(own, 2 * width + 1) & ~mask[box]
+        inside = labels[box] == region.label
+        yield box, inside, dilate(inside, 2 * width + 1) & ~mask[box]
 
 
 def rings(mask, width=1):
@@ -104,13 +104,13 @@ def transfer(values, mask, width=1, printed=False, *, connectivity=2, most=None)
     """Eq. 11 on the channels of an ``(H, W, C)`` array."""
     values = values.astype(float)
     result = values.copy()
-    for box, own, ring in components(mask, width, connectivity):
+    for box, place, ring in components(mask, width, connectivity):
         if ring.any():
-            inside, around = values[box][own], values[box][ring]
+            inside, around = values[box][place], values[box][ring]
             sigma, sigma_ring = _std(inside), _std(around)
             gain = _ratio(sigma**2, sigma_ring**2) if printed else _ratio(sigma_ring, sigma)
             gain = gain if most is None else np.minimum(gain, most)
-            result[box][own] = around.mean(axis=0) + (inside - inside.mean(axis=0)) * gain
+            result[box][place] = around.mean(axis=0) + (inside - inside.mean(axis=0)) * gain
     return result
 
 

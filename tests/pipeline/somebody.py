@@ -1,4 +1,4 @@
-"""Methods as somebody else would write them, named by ``tests.pipeline.somebody:...``."""
+"""Methods as users write them, named by ``tests.pipeline.somebody:...``."""
 
 from dataclasses import dataclass
 
@@ -44,18 +44,6 @@ def fails_on_13(image, moment):
 
 def always_fails(image):
     raise KeyError("weights")
-
-
-def fails_early(image, moment):
-    if moment is not None and moment.number < 12:
-        return [][moment.number]
-    return lower_half(image)
-
-
-def fails_by_number(image, moment):
-    if moment is not None and moment.number < 5:
-        raise ValueError(f"frame {moment.number} has no horizon")
-    return lower_half(image)
 
 
 def wrong_size(image):

@@ -1,13 +1,13 @@
-"""Stages of somebody else: found by their names, and guarded."""
+"""Stages from outside the package: imported by their names, and guarded."""
 
 import numpy as np
 import pytest
 
 from roadeval.config.run import configure
 from roadeval.config.tables import ConfigError
-from roadeval.data import Moment, Packed
-from roadeval.pipeline.stage import Output, StageError, View
-from roadeval.pipeline.stages import UnknownStageError, stages_of
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Moment, Output, Packed, mask_spec
+from roadeval.pipeline.stage import Stage, StageError, View
+from roadeval.pipeline.stages import UnknownStageError, guard, stages_of
 from tests.pipeline.images import noise
 from tests.pipeline.making import default
 
@@ -35,9 +35,9 @@ def test_a_functions_settings_are_those_of_its_default():
 
 
 def test_floats_are_probabilities():
-    found = output_of("gradual")
-    assert found.probability[:, 0].tolist() == [round(65535 * row / 7) for row in range(8)]
-    assert np.array_equal(found.mask.pixels(), found.probability > 32768)
+    output = output_of("gradual")
+    assert output.probability[:, 0].tolist() == [round(65535 * row / 7) for row in range(8)]
+    assert np.array_equal(output.mask.pixels(), output.probability > 32768)
 
 
 def test_a_function_can_ask_for_the_moment():
@@ -53,16 +53,16 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "message"),
     [("wrong_size", r"its mask is \(2, 2\)"), ("LAYERS", "a layer 'level' that it does not")],
 )
-def test_an_output_that_cannot_be_is_an_error(name, said):
-    with pytest.raises(StageError, match=said):
+def test_an_output_that_cannot_be_is_an_error(name, message):
+    with pytest.raises(StageError, match=message):
         output_of(name)
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "message"),
     [
         (somebodys("nothing"), "has no attribute 'nothing'"),
         (somebodys("wrong_argument"), "its argument frame is none of image, moment, settings"),
@@ -75,10 +75,10 @@ def test_an_output_that_cannot_be_is_an_error(name, said):
         (":", "there is no stage ':'; choose"),
     ],
 )
-def test_what_is_no_stage_is_named_with_the_reason(name, said):
-    with pytest.raises(UnknownStageError, match=said):
+def test_what_is_no_stage_is_named_with_the_reason(name, message):
+    with pytest.raises(UnknownStageError, match=message):
         stages_of([name])
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=message):
         configure({"chain": [name, "post"]})
 
 
@@ -113,3 +113,40 @@ def test_after_an_image_the_channels_are_its_own():
     np.testing.assert_array_equal(np.dstack(view.planes), image)
     assert later.original is image
     assert later.mask is MASK
+
+
+CLASSES = tuple(LabelClass(i, str(i), (i, 0, 0, 255)) for i in range(3))
+SPEC = mask_spec("mask", "Mask")
+LABELS = LayerSpec("labels", LayerKind.LABELS, "Labels", CLASSES)
+RGB = LayerSpec("rgb", LayerKind.RGB, "Colours")
+BLACK = np.zeros((4, 6, 3), np.uint8)
+
+
+def run(spec, array):
+    def bind(_settings, _parameters):
+        road = Packed.of(BLACK[..., 0])
+        return lambda view: Output((Layer(spec, array),), mask=road)
+
+    stage = Stage("own", "Own", int, bind, (spec,))
+    return guard(stage).bind(0, None)(View.of(BLACK))
+
+
+@pytest.mark.parametrize("held", [bool, np.int64])
+def test_a_mask_may_hold_any_whole_numbers(held):
+    run(SPEC, BLACK[..., 0].astype(held))
+
+
+@pytest.mark.parametrize(
+    ("spec", "held"),
+    [(SPEC, np.float32), (LABELS, np.int64), (LABELS, bool), (RGB, np.float32), (RGB, np.uint16)],
+)
+def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
+    array = (BLACK if spec is RGB else BLACK[..., 0]).astype(held)
+    with pytest.raises(StageError, match=f"its layer '{spec.name}' is {np.dtype(held)}"):
+        run(spec, array)
+
+
+def test_a_layer_of_another_size_is_named():
+    message = r"its layer 'mask' is uint8 \(3, 6\): it must be bool or integer \(4, 6\)"
+    with pytest.raises(StageError, match=message):
+        run(SPEC, BLACK[:3, :, 0])

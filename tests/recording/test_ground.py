@@ -1,6 +1,8 @@
 """The ground in the viewer: where its pictures lie in space, and in a rig below which paths."""
 
+import subprocess
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,8 @@ import rerun.blueprint as rrb
 from roadeval.data import Calibration, VariantLayout, mask_spec
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
-from roadeval.recording.layout import GROUND, Layout
+from roadeval.recording import viewer
+from roadeval.recording.layout import GROUND, Layout, RecordingError
 from roadeval.recording.views import arrange, before_the_first_frame
 
 SIZE = 64, 48
@@ -67,3 +70,55 @@ def test_the_space_shows_camera_ground_and_the_logs_point_clouds(prefix: str):
     paths = [f"{prefix}{path}" for path in ("/ground", "/ground/filtered", "/camera")]
     assert space.contents == [*paths, "/lidar/points"]
     assert [*space.visualizer_overrides] == [f"{prefix}/camera", f"{prefix}/ground"]
+
+
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    """A viewer that says how it was called and ends at once."""
+    script = tmp_path / "rerun"
+    script.write_text('#!/bin/sh\necho "$@ CI=$CI"\nexit 3\n')
+    script.chmod(0o700)
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
+    start = subprocess.Popen
+    monkeypatch.setattr(
+        subprocess, "Popen", lambda words, **options: start([script, *words[1:]], **options)
+    )
+
+
+def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine_alone(
+    fake, tmp_path
+):
+    said = r"the viewer did not start: .*--bind 127\.0\.0\.1 --port \d+ .* CI=1"
+    with pytest.raises(RecordingError, match=said):
+        viewer.screenshot(tmp_path / "x.rrd", tmp_path / "x.png")
+
+
+def test_a_viewer_that_is_late_is_asked_again():
+    answers = iter([TimeoutError("Deadline expired"), TimeoutError("Deadline expired"), "drawn"])
+
+    def request():
+        answer = next(answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    assert viewer.ask(request) == "drawn"
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (TimeoutError("Deadline expired"), "the viewer did not answer within 120 s"),
+        (ConnectionError("tcp connect error"), "the viewer has ended: tcp connect error"),
+        (RuntimeError("no window"), "the viewer has ended: no window"),
+    ],
+)
+def test_a_viewer_that_never_answers_or_has_ended_is_told_in_one_line(failure, said, monkeypatch):
+    clock = count(step=100)
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+
+    def request():
+        raise failure
+
+    with pytest.raises(RecordingError, match=f"^{said}$"):
+        viewer.ask(request)

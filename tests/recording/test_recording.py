@@ -1,5 +1,7 @@
 """What was recorded is read back: images, numbers and texts."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import cv2
@@ -7,10 +9,20 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from roadeval.recording.layout import RecordingError, RecordRule
+from roadeval.data import RESERVED
+from roadeval.recording.layout import Layout, RecordingError, RecordRule
 from roadeval.recording.recorder import Recorder
 from roadeval.recording.recording import Recording
-from tests.recording.making import RESULTS, frame, layout, record, rows_of, unscored
+from tests.recording.making import (
+    RESULTS,
+    VARIANT,
+    frame,
+    layout,
+    paths_of,
+    record,
+    rows_of,
+    unscored,
+)
 from tests.results.making import lines
 
 
@@ -105,3 +117,35 @@ def test_every_frame_comes_back_in_any_order(drive, recording, has_index, tmp_pa
     assert again.complete == has_index
     for each in (*drive[9:], *reversed(drive)):
         np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
+
+
+def test_a_layout_survives_its_json():
+    whole = layout(first_frame=10, rate_hz=15.0, properties={"version": "1", "frames": 3})
+    assert Layout.from_json(whole.to_json()) == whole
+
+
+@pytest.mark.parametrize("name", [*sorted(RESERVED), "../x", "a b", "", "größe"])
+def test_a_variant_cannot_take_a_name_that_the_recording_uses_or_cannot_hold(name):
+    variant = type(VARIANT)(name, "", ("post",), VARIANT.layers)
+    with pytest.raises(RecordingError, match=f"named '{name}'"):
+        layout(variants=(variant,))
+
+
+def test_every_path_that_is_no_variants_begins_with_a_reserved_name(recording):
+    tops = {path.split("/")[1] for path in paths_of(recording.path)}
+    assert tops - {"filtered", "__properties"} < RESERVED
+
+
+@pytest.mark.parametrize("text", ["all", "masks", "none", "worst:1", "every:10", "worst:99999999"])
+def test_a_rule_is_its_kind_and_number(text):
+    rule = RecordRule.parse(text)
+    kind, _, number = text.partition(":")
+    assert (rule.kind, rule.number) == (kind, int(number or 0))
+
+
+def test_a_rule_is_checked_without_rerun():
+    code = (
+        "import sys; from roadeval.recording.layout import RecordRule; RecordRule.parse('all'); "
+        "sys.exit('rerun' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

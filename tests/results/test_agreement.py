@@ -12,7 +12,7 @@ from roadeval.results.fleet import FleetWriter, Made, results_path
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import csv_lines
 from roadeval.results.schema import TABLES
-from roadeval.results.sentences import sentence, verdict
+from roadeval.results.verdict import verdict
 from tests.evaluation.making import a_drive, a_result, a_table, autoregression
 from tests.results.making import KEY, facts_of
 
@@ -92,12 +92,3 @@ def test_all_three_judge_the_same_difference_alike(variants, tmp_path):
         return each.mean, each.low, each.high, each.p, each.p_holm, each.comparisons
 
     assert {n: facts(e) for n, e in of_fleet.items()} == {n: facts(e) for n, e in of_replay.items()}
-
-
-def test_the_sentence_of_a_replay_is_that_of_the_comparison_but_for_what_brings_it_about():
-    _, totals, effects, told = replayed(errors_of(CASES[1]))
-    (effect,) = (e for e in effects if (e.base, e.variant) == ("unfiltered", "filtered"))
-    ends = totals["unfiltered"]["post"], totals["filtered"]["post"]
-    said = sentence(effect.rates["ERR"], "the filter", "ERR of post", ends)
-    assert " from " in said
-    assert told.endswith(said)

@@ -8,7 +8,7 @@ import pytest
 
 from roadeval.results.facts import Facts, LogFacts, digest_of
 from roadeval.results.tables import ResultsError
-from tests.evaluation.test_effects import effects_of
+from tests.evaluation.test_scoreboard import effects_of
 from tests.results.making import facts_of
 
 NAMES = ("filtered", "unfiltered", "net", "net_tuned", "blind")

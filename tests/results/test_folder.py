@@ -19,7 +19,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
 from roadeval.results.facts import Facts, FrameAccount
-from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
+from roadeval.results.folder import ResultsFolder, ResultsWriter, names_of_results
 from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
 from roadeval.results.tables import ResultsError
 from tests.evaluation.making import a_frame, a_variant, pixels
@@ -116,7 +116,7 @@ def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: A
     write(tmp_path / "results")
     path = tmp_path / "results" / "summary.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"files": listed}))
-    assert not belonging(path) & {"notes.txt", "..", ".", "n", "a", "/etc"}
+    assert not names_of_results(path) & {"notes.txt", "..", ".", "n", "a", "/etc"}
     (tmp_path / "results" / "folder").mkdir()
     for name in ("notes.txt", "results/n", "results/a"):
         (tmp_path / name).write_text("mine")

@@ -1,12 +1,20 @@
 """Files that appear under their name only when they are complete."""
 
+import errno
+import fcntl
+import json
 import os
+import re
+import signal
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from roadeval.runtime import files
+from roadeval.runtime.files import Content, NewFolder, claimed
 
 
 def names(folder):
@@ -88,14 +96,14 @@ def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
     files.check_output(tmp_path / "new", folder=True)
 
 
-def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
+def test_a_partial_name_is_found_again_and_no_two_are_the_same(tmp_path):
     for name in ("out.rrd", "drive", "a[1].b", ".hidden"):
         for hidden in (False, True):
-            given = {files.own_name(tmp_path / name, hidden=hidden) for _ in range(4)}
-            for each in given:
-                each.touch()
-            assert set(files.own_names(tmp_path / name, hidden=hidden)) == given
-            assert len(given) == 4
+            names = {files.partial_name(tmp_path / name, hidden=hidden) for _ in range(4)}
+            for partial in names:
+                partial.touch()
+            assert set(files.find_partial(tmp_path / name, hidden=hidden)) == names
+            assert len(names) == 4
 
 
 def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
@@ -112,3 +120,201 @@ def test_a_pointer_of_git_lfs_is_no_input(tmp_path):
     pointer.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
     with pytest.raises(OSError, match="is a pointer to a file in Git LFS: git lfs pull"):
         files.check_input(pointer)
+
+
+HELD = """
+import pathlib, sys
+from roadeval.runtime.files import claimed
+with claimed(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]).parent):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+def listed(folder):
+    return [path.name for path in folder.iterdir()]
+
+
+@pytest.fixture
+def other(tmp_path):
+    """Another process that holds the claim on ``out``."""
+    command = [sys.executable, "-c", HELD, tmp_path / "out"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"held\n"
+        yield process
+        process.kill()
+
+
+def claim(folder, name="out"):
+    with claimed(folder / name, folder) as certain:
+        return certain
+
+
+def test_what_another_process_writes_is_refused_with_its_name_until_it_is_killed(other, tmp_path):
+    with pytest.raises(BlockingIOError) as caught:
+        claim(tmp_path)
+    match = re.fullmatch(
+        r"another run is writing it \(process (\d+) on \S+, since \d{4}-\d\d-\d\d \d\d:.*\)",
+        caught.value.strerror,
+    )
+    assert int(match[1]) == other.pid
+    assert claim(tmp_path, "another")
+    other.send_signal(signal.SIGKILL)
+    other.wait()
+    assert listed(tmp_path) == [".out.lock"]
+    assert claim(tmp_path)
+    assert listed(tmp_path) == []
+
+
+def test_two_in_one_process_are_two_and_the_first_one_s_lock_stays(tmp_path):
+    with claimed(tmp_path / "out", tmp_path):
+        for _ in range(2):
+            with pytest.raises(BlockingIOError, match=f"process {os.getpid()} on"):
+                claim(tmp_path)
+        assert listed(tmp_path) == [".out.lock"]
+    assert claim(tmp_path)
+
+
+def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_path, monkeypatch):
+    """The run that had it ends between the moments in which the next opens and locks its file."""
+    usual, removed = fcntl.flock, []
+
+    def late(lock, how):
+        if not removed:
+            removed.append((tmp_path / ".out.lock").unlink())
+        usual(lock, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with claimed(tmp_path / "out", tmp_path) as certain:
+        assert certain
+        assert listed(tmp_path) == [".out.lock"]
+        with pytest.raises(BlockingIOError):
+            claim(tmp_path)
+
+
+def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkeypatch):
+    (tmp_path / ".out.lock").write_text("process 1 on elsewhere, since long ago")
+    usual = os.open
+
+    def forbidden(path, flags, *rest):
+        if flags & os.O_RDWR:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return usual(path, flags, *rest)
+
+    monkeypatch.setattr(os, "open", forbidden)
+    with claimed(tmp_path / "out", tmp_path) as certain:
+        assert certain
+        with pytest.raises(BlockingIOError, match="process 1 on elsewhere"):
+            claim(tmp_path)
+    assert listed(tmp_path) == []
+    with pytest.raises(PermissionError):
+        claim(tmp_path)
+
+
+def no_locks_of_the_system(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+
+
+def no_locks_of_the_disk(monkeypatch):
+    def fails(_file, _how):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", fails)
+
+
+@pytest.mark.parametrize("without", [no_locks_of_the_system, no_locks_of_the_disk])
+def test_without_locks_nothing_is_certain(without, tmp_path, monkeypatch):
+    without(monkeypatch)
+    with claimed(tmp_path / "out", tmp_path) as one, claimed(tmp_path / "out", tmp_path) as other:
+        assert (one, other) == (False, False)
+    assert listed(tmp_path) == []
+
+
+def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, monkeypatch):
+    monkeypatch.setattr("time.sleep", lambda _seconds: (other.kill(), other.wait()))
+    with claimed(tmp_path / "out", tmp_path, wait=True) as certain:
+        assert certain
+
+
+def names_in(seal):
+    """Return the names that the seal lists, or else those that always belong to a content."""
+    try:
+        return frozenset(json.loads(seal.read_text()))
+    except OSError:
+        return frozenset({"seal", "table"})
+
+
+CONTENT = Content("seal", names_in)
+
+
+def begun(path, content):
+    """A new folder with these files, sealed."""
+    new = NewFolder(path, CONTENT)
+    new.begin()
+    for name, text in content.items():
+        (new.partial / name).write_text(text)
+    (new.partial / "seal").write_text(json.dumps([*content, "seal"]))
+    return new
+
+
+def write(path, **content):
+    begun(path, content).publish()
+
+
+def read(path):
+    return {file.name: file.read_text() for file in path.iterdir() if file.name != "seal"}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """An earlier content."""
+    write(tmp_path / "folder", table="old", only_old="old")
+    return tmp_path / "folder"
+
+
+def test_the_earlier_content_is_replaced_and_what_is_of_others_stays(folder):
+    (folder / "notes").write_text("mine")
+    (folder / "link").symlink_to("notes")
+    write(folder, table="new", only_new="new")
+    mine = {"notes": "mine", "link": "mine"}
+    assert read(folder) == {"table": "new", "only_new": "new", **mine}
+    assert (folder / "link").is_symlink()
+    assert [file.name for file in folder.parent.iterdir()] == ["folder"]
+
+
+def test_a_folder_of_others_is_never_moved_nor_replaced(folder):
+    (folder / "sub").mkdir()
+    (folder / "sub" / "notes").write_text("mine")
+    before = (folder / "sub").stat()
+    write(folder, table="new")
+    assert os.path.samestat((folder / "sub").stat(), before)
+    new = begun(folder, {"sub": "new"})
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        new.publish()
+    new.discard()
+    assert (folder / "table").read_text() == "new"
+    assert (folder / "sub" / "notes").read_text() == "mine"
+    assert {file.name for file in folder.parent.iterdir()} == {"folder"}
+
+
+def test_a_folder_stays_where_it_is(folder):
+    before = folder.stat()
+    write(folder, table="new")
+    assert read(folder) == {"table": "new"}
+    assert os.path.samestat(folder.stat(), before)
+    assert [file.name for file in folder.parent.iterdir()] == ["folder"]
+
+
+def test_a_folder_that_was_made_for_nothing_goes_and_an_empty_one_stays(tmp_path):
+    (tmp_path / "mine").mkdir()
+    for name in ("mine", "new"):
+        begun(tmp_path / name, {"table": "new"}).discard()
+    assert [file.name for file in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_link_stays_and_the_folder_behind_it_is_replaced(folder):
+    link = folder.parent / "link"
+    link.symlink_to("folder")
+    write(link, table="new")
+    assert link.is_symlink()
+    assert read(folder) == {"table": "new"}

@@ -1,11 +1,13 @@
 """An ordered, bounded map over threads that stops at the first error."""
 
+import subprocess
+import sys
 import threading
 import time
 
 import pytest
 
-from roadeval.runtime.threads import AHEAD, ended, ordered
+from roadeval.runtime.threads import AHEAD, ordered, time_limit
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
@@ -56,7 +58,7 @@ def test_work_without_end_is_ended_where_the_map_is_stopped_early():
 
     def work(item: int) -> int:
         if item:
-            with ended(endless.set, 600):
+            with time_limit(endless.set, 600):
                 endless.wait()
         return item
 
@@ -64,3 +66,31 @@ def test_work_without_end_is_ended_where_the_map_is_stopped_early():
     assert next(results) == 0
     results.close()
     assert endless.is_set()
+
+
+FAULTS = """
+import resource
+import numpy as np
+from roadeval.runtime.memory import reuse
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        [np.ones(1 << 20, np.uint8) for _ in range(20)]
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+faults()
+first = faults()
+reuse()
+faults()
+print(first, faults())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's malloc is set")
+def test_arrays_that_were_freed_are_not_asked_of_the_system_again() -> None:
+    run = subprocess.run([sys.executable, "-c", FAULTS], stdout=subprocess.PIPE, check=True)
+    before, after = map(int, run.stdout.split())
+
+    assert before > 20 * 20  # pages
+    assert after < before / 10

@@ -3,19 +3,25 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from roadeval.config.run import configure
-from roadeval.data import Frame, Role
+from roadeval.data import NON_ROAD, ROAD, Frame, Role
 from roadeval.errors import RoadevalError
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
+from roadeval.pipeline.stage import View
 from roadeval.training import learning
 from roadeval.training.learning import (
+    WIDTH,
     Schedule,
     TrainingError,
     fit,
     from_drives,
     from_file,
     from_log,
+    patch_truth,
+    sample,
 )
 from roadeval.training.model import save_model
 from roadeval.training.settings import TrainingSettings
@@ -24,9 +30,10 @@ from tests.training.making import frame, pipelines
 PIPELINES = {
     # A plane is fitted and tabulated in half the time, and no test asks what was learnt.
     name: replace(
-        each, settings={**each.settings, "svm": replace(each.settings["svm"], kernel="linear")}
+        pipeline,
+        settings={**pipeline.settings, "svm": replace(pipeline.settings["svm"], kernel="linear")},
     )
-    for name, each in pipelines().items()
+    for name, pipeline in pipelines().items()
 }
 
 
@@ -61,9 +68,9 @@ def roles(frames, schedule: Schedule) -> str:
 
 
 def learn(logged, *, labelled: bool = True, **settings):
-    wanted = TrainingSettings(**settings)
+    chosen = TrainingSettings(**settings)
     return from_log(
-        lambda only=None, **_: logged, PIPELINES, wanted, lambda done: None, labelled=labelled
+        lambda only=None, **_: logged, PIPELINES, chosen, lambda done: None, labelled=labelled
     )
 
 
@@ -147,7 +154,7 @@ BARE = [frame(n, labelled=False) for n in range(2, 4)]
 
 
 def of_drives(source: str, **frames):
-    drives = {Path(name): own for name, own in frames.items()}
+    drives = {Path(name): drive for name, drive in frames.items()}
     return from_drives(drives, PIPELINES, TrainingSettings(source=source))
 
 
@@ -175,11 +182,11 @@ def test_a_drive_without_truth_among_others_is_named(source, frames):
 
 def adapt(logged, path, pipelines, **settings):
     base, _ = from_file(path, pipelines)
-    wanted = TrainingSettings(model=str(path), adapt=True, **settings)
+    chosen = TrainingSettings(model=str(path), adapt=True, **settings)
     model, schedule = from_log(
         lambda only=None, **_: logged,
         pipelines,
-        wanted,
+        chosen,
         lambda done: None,
         labelled=True,
         base=base,
@@ -200,14 +207,14 @@ def robust(tmp_path):
 def test_an_adapted_model_has_learnt_from_both_and_says_so(robust):
     pipelines, path = robust
     base, model, schedule = adapt(log(8), path, pipelines, frames=2, gap=1)
-    own, taught = model.parameters["unfiltered"]["trees"], base.parameters["unfiltered"]["trees"]
-    assert own.base is taught
+    adapted = model.parameters["unfiltered"]["trees"]
+    assert adapted.base is base.parameters["unfiltered"]["trees"]
     assert base.digests < model.digests
     assert len(model.digests) == 4
     assert roles(log(8), schedule) == "ttgeeeee"
-    (told,) = [each for each in model.warnings if "adapted to this drive" in each]
-    assert "2 of its own labelled frames" in told
-    assert str(path) in told
+    (warning,) = [text for text in model.warnings if "adapted to this drive" in text]
+    assert "2 of its own labelled frames" in warning
+    assert str(path) in warning
 
 
 def test_frames_that_the_model_learnt_from_are_not_evaluated_after_adapting_either(robust):
@@ -223,7 +230,7 @@ def test_without_truth_the_patch_adapts_only_where_that_is_insisted_on(robust):
         adapt(logged, path, pipelines, frames=2)
     _, model, _ = adapt(logged, path, pipelines, frames=2, source="patch")
     assert model.source == "patch"
-    assert any("by the reference patch" in each for each in model.warnings)
+    assert any("by the reference patch" in text for text in model.warnings)
 
 
 def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
@@ -233,3 +240,119 @@ def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
         TrainingError, match=r"no stage of it can learn further \(similarity, svm\)"
     ):
         adapt(log(4), path, PIPELINES, frames=2)
+
+
+FRAMES = [frame(n) for n in range(3)]
+
+
+def test_a_fitted_variant_finds_the_road_in_a_new_frame():
+    pipeline = pipelines()["unfiltered"]
+    model = fit(FRAMES, {"unfiltered": pipeline}, TrainingSettings())
+    chain = pipeline.bind(model.parameters["unfiltered"])
+    fresh = frame(9)
+    masks = {
+        result.stage: result.output.mask.pixels() for result in chain.run(View.of(fresh.image))
+    }
+    for name in ("similarity", "svm", "post"):
+        wrong = (masks[name] != fresh.truth).mean()
+        assert wrong < 0.06, name
+
+
+def test_road_colour_is_the_mean_of_the_sampled_road_pixels():
+    model = fit(FRAMES, pipelines(), TrainingSettings(pixels_per_class=10_000))
+    road = np.concatenate([f.image[f.truth == 1] for f in FRAMES]).astype(float)
+    colour = model.parameters["unfiltered"]["similarity"]
+    # Every road pixel is drawn: there are as many as of the verge.
+    np.testing.assert_allclose(colour.mean, road.mean(axis=0))
+    np.testing.assert_allclose(colour.covariance, np.cov(road.T, ddof=0))
+
+
+def test_training_twice_gives_the_same_model():
+    first, second = (fit(FRAMES, pipelines(), TrainingSettings()) for _ in range(2))
+    machines = [m.parameters["filtered"]["svm"] for m in (first, second)]
+    np.testing.assert_array_equal(machines[0].vectors, machines[1].vectors)
+    np.testing.assert_array_equal(machines[0].weights, machines[1].weights)
+
+
+def test_one_class_alone_is_an_error_that_names_the_frames():
+    sky = frame(4)
+    sky.truth[:] = 0
+    with pytest.raises(TrainingError, match="frames 4 to 4 do not show both road and non-"):
+        fit([sky], pipelines(), TrainingSettings())
+
+
+# --- Which pixels train ---------------------------------------------------------------------------
+
+HALF = np.repeat([[1], [0]], [4, 4], axis=0).repeat(10, axis=1).astype(np.uint8)
+
+
+def test_both_classes_are_drawn_equally_from_every_frame():
+    pixels = sample([HALF, HALF], TrainingSettings(pixels_per_class=5))
+    assert len(pixels.road) == 20
+    for number in (0, 1):
+        for road in (True, False):
+            assert ((pixels.frame == number) & (pixels.road == road)).sum() == 5
+
+
+def test_a_frame_without_road_still_gives_its_other_pixels():
+    pixels = sample([np.zeros_like(HALF), HALF], TrainingSettings(pixels_per_class=4))
+    assert (pixels.road.sum(), (~pixels.road).sum()) == (4, 4)
+    assert set(pixels.frame[~pixels.road]) == {0, 1}
+
+
+@pytest.mark.parametrize("frames", [1, 7, 60])
+def test_the_sample_is_bounded_however_many_frames_there_are(frames):
+    pixels = sample([HALF] * frames, TrainingSettings(max_pixels=40))
+    assert len(pixels.road) <= 40
+
+
+def test_the_seed_settles_the_draw():
+    drawn = [sample([HALF], TrainingSettings(pixels_per_class=5, seed=s)) for s in (1, 1, 2)]
+    np.testing.assert_array_equal(drawn[0].column, drawn[1].column)
+    assert (drawn[0].column != drawn[2].column).any()
+
+
+# --- What the reference patch teaches -------------------------------------------------------------
+
+HEIGHT = 120
+SETTINGS = TrainingSettings()
+
+
+def street(grey=100, kerb=112, pavement=100, shade=0.8):
+    """A street with noise, a kerb and a pavement on its right, and a shadow across its middle."""
+    image = np.full((2 * HEIGHT, 2 * WIDTH, 3), float(grey))
+    image[:, 2 * kerb :] = pavement
+    image[:, 2 * kerb : 2 * kerb + 4] = 0.5 * grey
+    image[120:150] *= shade
+    noise = np.random.default_rng(0).normal(0, 1, image.shape[:2])
+    return (image + noise[..., None]).clip(0, 255).astype(np.uint8)
+
+
+def test_what_is_reached_without_crossing_a_kerb_is_road():
+    truth = patch_truth(street(), SETTINGS)
+    low = truth[100:]
+    assert (low[:, :216] == ROAD).mean() > 0.99
+    assert (low[:, 232:] == NON_ROAD).mean() > 0.99
+
+
+def test_the_pavement_is_road_where_the_kerb_is_lowered():
+    lowered = street()
+    lowered[200:] = street(kerb=WIDTH)[200:]
+    assert (patch_truth(lowered, SETTINGS)[100:, 232:] == ROAD).mean() > 0.5
+
+
+def test_the_further_one_may_reach_the_more_is_road():
+    shares = [
+        (patch_truth(street(), TrainingSettings(far=far))[100:, 232:] == ROAD).mean()
+        for far in (1.0, 20.0)
+    ]
+    assert shares[0] < 0.01
+    assert shares[1] > 0.99
+
+
+@pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])
+def test_the_patch_is_road_whatever_it_shows(shape):
+    image = np.random.default_rng(0).integers(0, 256, (*shape, 3), dtype=np.uint8)
+    truth = patch_truth(image, TrainingSettings(horizon=1.0, far=0.01))
+    assert truth.dtype == np.uint8
+    np.testing.assert_array_equal(truth == ROAD, patch_mask(*shape, ReferencePatch()) > 0)

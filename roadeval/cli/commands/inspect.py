@@ -24,7 +24,11 @@ Rank = Annotated[
 ]
 Variant = Annotated[
     str | None,
-    arguments.option("--variant", "Whose failures count. Default: the first variant's.", "NAME"),
+    arguments.option(
+        "--variant",
+        "Variant whose failures count; by default what you brought, else `filtered`.",
+        "NAME",
+    ),
 ]
 Screenshot = Annotated[
     Path | None,

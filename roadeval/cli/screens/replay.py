@@ -17,7 +17,8 @@ from roadeval.report.blocks import Block, Text
 from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
-from roadeval.results.sentences import account, correction, without_truth
+from roadeval.results.sentences import account, correction
+from roadeval.results.verdict import without_truth
 
 if TYPE_CHECKING:
     from rich.console import Console

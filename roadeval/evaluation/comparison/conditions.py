@@ -1,4 +1,4 @@
-"""Conditions: limits that a comparison must keep, and the small language they are written in.
+"""Conditions: limits that a comparison must keep, and the grammar that they are written in.
 
 A condition is a quantity, an operator and a limit, and may ask for certainty::
 
@@ -10,21 +10,21 @@ A condition is a quantity, an operator and a limit, and may ask for certainty::
     RATE      := ACC ERR TPR FNR TNR FPR, each also as pooled_..., IoU mIoU F1 precision
                  (of all pixels together, with or without pooled_)
 
-A change is that of the frames that both results evaluated, a level that of all frames of the new
-result. Of several drives both are means over drives, each group of drives alike. Nothing is ever
-executed.
+A change is computed on the frames that both results evaluated, a level on all frames of the new
+result. If there are several drives, both are means over drives, each group of drives alike. Nothing
+is ever executed.
 
-With ``surely`` the whole interval of the change must lie beyond the limit. The interval is in doubt
-about frames, not about what the training's seed draws, so the limit must leave room for that: of 20
-ordered pairs of five seeds on a drive of CamVid (0006R0) two trip +0.5 pp, and none trips it
+With ``surely`` the whole interval of the change must lie beyond the limit. The interval allows for
+chance in the frames, not for the training's seed, so the limit must leave room for that: two of 20
+ordered pairs of five seeds on a drive of CamVid (0006R0) exceed +0.5 pp, and none exceeds it
 surely; without room, at +0 pp, seven still do. Only the mean change of ACC, ERR, FNR and FPR has an
 interval.
 
-A condition that cannot be judged is never taken for one that is kept: where a rate is undefined, a
-change is asked for between different scales or truths, certainty without an interval, and where
-frames are too few. They must be at least as many as an interval needs
+A condition that cannot be judged never counts as kept. It cannot be judged if a rate is undefined,
+if a change is between different scales or truths, if certainty is required and there is no
+interval, or if frames are too few. There must be at least as many as an interval needs
 (``evaluation.least_frames``), and for a change at least half of the frames of the shorter result;
-where several drives are compared, half of the scored drives of the smaller one.
+if several drives are compared, half of the scored drives of the smaller result.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
+from roadeval.evaluation.comparison.compare import ComparedResult, Comparison, MaskChange
 from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -70,7 +70,7 @@ class Condition:
     rate: str
     operator: str
     limit: float
-    """In percentage points of change if ``is_change``, else in percent."""
+    """In percentage points if ``is_change``, else in percent."""
     is_change: bool
     surely: bool = False
     """Whether the whole interval of the change must lie beyond the limit."""
@@ -79,8 +79,8 @@ class Condition:
     def parse(cls, text: str) -> Condition:
         """Read a condition.
 
-        A `ConditionError` if it does not follow the grammar, or asks for certainty that cannot be
-        had.
+        A `ConditionError` if it does not follow the grammar, or asks for certainty about a quantity
+        without an interval.
         """
         match = _GRAMMAR.fullmatch(text)
         if match is None:
@@ -103,30 +103,30 @@ class Condition:
             raise ConditionError(
                 f"{text!r}: {rate} has no interval; 'surely' goes with {', '.join(COMPARED)}"
             )
-        own, is_change = " ".join(text.split()), unit == "pp"
-        return cls(own, stage, variant, rate, sign, float(number), is_change, bool(surely))
+        limit = float(number), unit == "pp", bool(surely)
+        return cls(" ".join(text.split()), stage, variant, rate, sign, *limit)
 
-    def judge(self, mask: Change) -> Judgement:
-        """Judge the condition on what was found of the mask that it names."""
+    def judge(self, mask: MaskChange) -> Judgement:
+        """Judge the condition on the change of the mask that it names."""
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         difference = mask.difference.get(self.rate) if self.is_change else None
         value, low, high = after - before if self.is_change else after, None, None
         if difference is not None:
             value, low, high = difference.mean, difference.low, difference.high
         if math.isnan(value):
-            return self.unjudged(mask.result, f"the rate is undefined in {mask.result}")
+            return self.not_judged(mask.result, f"the rate is undefined in {mask.result}")
         limited: float | None = value
         if self.surely:
-            # The end of the interval that is nearest to keeping the limit.
+            # The end of the interval that is closest to keeping the limit.
             limited = low if self.operator in (">", ">=") else high
         if limited is None:
             why = difference.none_because if difference else ""
-            return self.unjudged(mask.result, f"{why}; replay more, or leave out 'surely'")
+            return self.not_judged(mask.result, f"{why}; replay more, or leave out 'surely'")
         holds = OPERATORS[self.operator](100 * limited, self.limit)
         return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
 
-    def unjudged(self, result: str, because: str) -> Judgement:
-        """Return that it could not be judged on a result, and why."""
+    def not_judged(self, result: str, because: str) -> Judgement:
+        """Return the judgement that it could not be judged on a result, and why."""
         why = f"{self.text}: not judged in {result}, because {because}"
         nan = math.nan
         return Judgement(self, result, 0, nan, nan, nan, None, None, None, why)
@@ -140,49 +140,49 @@ class Judgement:
     result: str
     """Label of the new result."""
     drives: int
-    """How many it was judged on."""
+    """Number of drives that it was judged on."""
     before: float
     after: float
-    """The rate of the base, NaN for a level, and of the new result."""
+    """The rate of the base (NaN for a level) and of the new result."""
     value: float
-    """What was judged: the change, or the level."""
+    """The change, or the level."""
     low: float | None
     high: float | None
-    """The interval of the change, None without one."""
+    """The interval of the change; None without one."""
     holds: bool | None
-    """None where it could not be judged."""
+    """None if it could not be judged."""
     why: str = ""
-    """The reason then."""
+    """The reason why not."""
 
 
 def judge(
     comparison: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
 ) -> Iterator[Judgement]:
-    """Judge each condition, in order, on every result that it names a mask of."""
+    """Judge each condition, in order, on every result that has the mask that it names."""
     for condition in conditions:
-        name = condition.stage, condition.variant
+        name = f"{condition.stage}.{condition.variant}"
         masks = comparison.changes if condition.is_change else comparison.levels
-        named = [mask for mask in masks if (mask.stage, mask.variant) == name]
+        named = [mask for mask in masks if f"{mask.stage}.{mask.variant}" == name]
         for mask in named:
-            why = _unjudged(condition, mask, comparison.results, settings.least_frames)
-            yield condition.unjudged(mask.result, why) if why else condition.judge(mask)
+            why = _why_not_judged(condition, mask, comparison.results, settings.least_frames)
+            yield condition.not_judged(mask.result, why) if why else condition.judge(mask)
         if not named:
-            there = ", ".join(sorted({f"{mask.stage}.{mask.variant}" for mask in masks}))
-            why = f"nothing compared is called {'.'.join(name)}; there are {there}"
-            new = ", ".join(each.label for each in comparison.results[1:])
-            yield condition.unjudged(new, why)
+            names = ", ".join(sorted({f"{mask.stage}.{mask.variant}" for mask in masks}))
+            why = f"nothing compared is called {name}; there are {names}"
+            new = ", ".join(result.label for result in comparison.results[1:])
+            yield condition.not_judged(new, why)
 
 
-def _unjudged(
-    condition: Condition, mask: Change, results: Sequence[ComparedResult], least: int
+def _why_not_judged(
+    condition: Condition, mask: MaskChange, results: Sequence[ComparedResult], least: int
 ) -> str:
-    """Return why a condition cannot be judged on a mask; empty where it can."""
+    """Return why a condition cannot be judged on a mask; empty if it can."""
     if not condition.is_change:
         if mask.frames >= least:
             return ""
         few = f"{mask.result} has {mask.frames} evaluated frames, and {least} are needed"
         return f"{few}; replay more of it"
-    base, new = results[0], next(each for each in results if each.label == mask.result)
+    base, new = results[0], next(result for result in results if result.label == mask.result)
     names = f"{base.label} and {new.label}"
     if None not in (base.scale, new.scale) and base.scale != new.scale:
         return (

@@ -1,4 +1,4 @@
-"""Pairs: the drives and frames that two results have in common, and where their masks differ."""
+"""The drives and frames that two results have in common, and where their masks differ."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from roadeval.evaluation.tables import (
     COUNTS,
     KEY,
     MASK,
-    grouped,
+    group_rows,
     is_final,
-    most_changed,
+    keys_of,
+    most_changed_frames,
     only,
-    paired,
+    pair_rows,
     rates_of,
 )
 
@@ -38,13 +39,13 @@ class ComparedDrive:
     name: str
     """Its name for people."""
     digest: str | None
-    """What tells the log from another, None where the result does not know it."""
+    """Identifies the log; None if the result does not know it."""
     frames: int
-    """Evaluated frames."""
-    asked: Mapping[str, Any]
-    """Settings that may change its numbers, by names such as ``frames.scale``, where known."""
+    """Number of evaluated frames."""
+    settings: Mapping[str, Any]
+    """Known settings that may change its numbers, by names such as ``frames.scale``."""
     group: str | None = None
-    """A name shared with other drives of the result, as of a day or a route."""
+    """A name shared with other drives of the result, for example a day or a route."""
 
     @property
     def key(self) -> tuple[str, str]:
@@ -57,23 +58,27 @@ class Side:
     """One of the results that are compared."""
 
     label: str
-    """What it is called in tables; its own among all."""
+    """Its name in tables, which no other result has."""
     drives: Sequence[ComparedDrive]
     tables: Callable[[str, Collection[tuple[str, str]]], pd.DataFrame]
-    """Returns the table ``frames`` of some drives, given by drive and camera, ``disagreements``, or
-    of ``regions`` the rows of final masks."""
+    """Returns a table of some drives, given by drive and camera: ``frames``, ``disagreements``, or
+    the rows of ``regions`` of final masks."""
     variants: Mapping[str, str] | None = None
-    """Maps each variant to compare to its name in the comparison; None keeps all."""
+    """Name in the comparison of each variant to compare; None keeps all."""
 
     def table(self, name: str, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
         """Return some drives' rows of the variants to compare, under the comparison's names.
 
-        A mapping of drives gives the keys that they have in the comparison; names are text then, as
-        in both results.
+        A mapping of drives gives their keys in the comparison; drives and cameras are text then.
         """
         rows = self.tables(name, drives)
         if isinstance(drives, Mapping):
-            rows = _renamed(rows, drives)
+            keys, places = keys_of(rows)
+            if unknown := {*keys} - drives.keys():
+                key = " ".join(min(unknown))
+                raise RoadevalError(f"a table has rows of {key}, which is not compared")
+            names = np.array([drives[key] for key in keys] or np.zeros((0, 2)), object)[places]
+            rows = rows.assign(drive=names[:, 0], camera=names[:, 1])
         if self.variants is None or "variant" not in rows:
             return rows
         rows = rows[rows["variant"].isin([*self.variants])]
@@ -81,19 +86,18 @@ class Side:
 
     @property
     def scored(self) -> list[ComparedDrive]:
-        """The drives of which any frame was scored."""
+        """The drives that have a scored frame."""
         return [drive for drive in self.drives if drive.frames]
 
 
 Pair = tuple[ComparedDrive, ComparedDrive]
 """A drive in the base and in the new result."""
 NAMED: Final = 5
-"""Drives that are named of those left out; frames of those that changed most, either way, and of
-those on which masks disagree."""
+"""Greatest number of drives named as left out, and of frames named as changed or disagreeing."""
 
 
 def left_out(names: Sequence[str], of: str, why: str) -> str:
-    """Return that drives are left out of a result, and why, in a sentence."""
+    """Return the sentence that drives are left out of a result, and why."""
     drives = "1 drive is" if len(names) == 1 else f"{len(names)} drives are"
     return f"{drives} left out of {of} ({why}): {first_of(names, NAMED)}"
 
@@ -102,10 +106,10 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
     """Match the drives of two results, each camera by the drive's name, else by its log.
 
     One name with two different logs is no match: the difference would be the scene's. Returned are
-    the drives that both have scored, in the base's order, and a sentence on all others for each
-    result and reason.
+    the drives that both have scored, in the base's order, and a sentence for each result and reason
+    on the others.
     """
-    there = {drive.key: drive for drive in new.drives}
+    by_key = {drive.key: drive for drive in new.drives}
     names = {drive.key for drive in base.drives}
     # A log may be in a result twice.
     logs: defaultdict[tuple[str | None, str], deque[ComparedDrive]] = defaultdict(deque)
@@ -115,14 +119,16 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
     pairs, taken = [], set()
     left: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for drive in base.drives:
-        other = there.get(drive.key)
+        other = by_key.get(drive.key)
         if other is None and drive.digest and logs[drive.digest, drive.camera]:
             other = logs[drive.digest, drive.camera].popleft()
-        if other is not None:
-            taken.add(other.key)
-        if reason := _why_not(drive, other, new.label):
+        if other is None:
+            left[base.label, f"not in {new.label}"].append(drive.name)
+            continue
+        taken.add(other.key)
+        if reason := _why_incomparable(drive, other, new.label):
             left[base.label, reason].append(drive.name)
-        elif other is not None:
+        else:
             pairs.append((drive, other))
     for drive in new.drives:
         if drive.key not in taken:
@@ -130,9 +136,7 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
     return pairs, [left_out(names, *about) for about, names in left.items()]
 
 
-def _why_not(base: ComparedDrive, new: ComparedDrive | None, label: str) -> str:
-    if new is None:
-        return f"not in {label}"
+def _why_incomparable(base: ComparedDrive, new: ComparedDrive, label: str) -> str:
     if not (base.frames and new.frames):
         return "not scored in both"
     if base.digest is None or new.digest is None:
@@ -141,7 +145,7 @@ def _why_not(base: ComparedDrive, new: ComparedDrive | None, label: str) -> str:
 
 
 def one_drive(sides: Sequence[Side]) -> list[Side] | None:
-    """Return the results with the one drive that is compared; None where several are, or none."""
+    """Return the results with the only drive that is compared; None unless it is exactly one."""
     base, *others = sides
     pairs = [match_drives(base, new)[0] for new in others]
     firsts = {matched[0][0].key for matched in pairs if matched}
@@ -151,47 +155,37 @@ def one_drive(sides: Sequence[Side]) -> list[Side] | None:
     return [replace(side, drives=[drive]) for side, drive in zip(sides, drives, strict=True)]
 
 
-def _renamed(rows: pd.DataFrame, keys: Mapping[tuple[str, str], tuple[str, str]]) -> pd.DataFrame:
-    """Return rows of drives under other keys."""
-    words = {name: rows[name].astype(str) for name in KEY}
-    there = [*zip(words["drive"], words["camera"], strict=True)]
-    if unknown := {*there} - keys.keys():
-        raise RoadevalError(f"a table has rows of {' '.join(min(unknown))}, which is not compared")
-    names = [keys[key] for key in there]
-    drive, camera = [*zip(*names, strict=True)] or ([], [])
-    return rows.assign(drive=[*drive], camera=[*camera])
-
-
 def common_masks(base: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
     """Match the masks of two results on the frames that both have, by stamp; in the base's order.
 
-    Final masks are matched with final masks, under any stage's name, others by their stage. Both
-    are rows of ``frames``; ``final`` is whether masks are final ones. The base's columns end in
-    ``_base``, and masks have the names of the new result.
+    Arguments are rows of ``frames``. Final masks are matched with final masks, whatever their
+    stages are called, other masks by their stage; the column ``final`` tells which they are. The
+    base's columns end in ``_base``, and masks have the names of the new result.
     """
 
-    def stepped(table: pd.DataFrame) -> pd.DataFrame:
+    def with_step(table: pd.DataFrame) -> pd.DataFrame:
         final = is_final(table)
         return table.assign(final=final, step=np.where(final, "", table["stage"].astype(str)))
 
-    return paired(stepped(base), stepped(new), [*KEY, "variant", "step", "final", "stamp_ns"])
+    return pair_rows(
+        with_step(base), with_step(new), [*KEY, "variant", "step", "final", "stamp_ns"]
+    )
 
 
 def truth_differs(base: pd.DataFrame, new: pd.DataFrame) -> int:
-    """Return on how many frames the truth is another, of two results' rows of ``frames``."""
-    once, other_once = (table[~table.duplicated([*KEY, "frame"])] for table in (base, new))
-    pairs = paired(once, other_once, [*KEY, "stamp_ns"])
-    one, other = pairs["truth"], pairs["truth_base"]
-    return int(((one != other) & (one != 0) & (other != 0)).sum())  # 0 is unknown
+    """Return the number of frames whose truth differs, from two results' rows of ``frames``."""
+    base, new = (table[~table.duplicated([*KEY, "frame"])] for table in (base, new))
+    truths = pair_rows(base, new, [*KEY, "stamp_ns"])[["truth", "truth_base"]]
+    return int((truths.ne(0).all(axis=1) & truths["truth"].ne(truths["truth_base"])).sum())
 
 
 def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -> pd.DataFrame:
-    """Return masks' pairs by region, with the counts there, of the regions that both share.
+    """Return pairs of masks by region, with the counts there, for the regions that both share.
 
-    ``pairs`` are final masks' as of `common_masks`, ``base`` and ``new`` rows of ``regions``. Any
+    ``pairs`` are final masks, as of `common_masks`; ``base`` and ``new`` are rows of ``regions``. A
     region that is not the same pixels in both, as the shadow that another filter found, is left
-    out: its ERR would describe other places. They may be the same where each frame of a drive has
-    as many, and as much road. Frames that label none of it are left out, too.
+    out: its ERR would describe other places. Pixels are taken for the same if each frame of a drive
+    has as many of them, and as many of road. Frames that label none of them are left out, too.
     """
     numbered = pairs[[*KEY, "variant", "stage", "stage_base", "frame", "frame_base", "stamp_ns"]]
     numbered = numbered.assign(pair=np.arange(len(pairs)))
@@ -209,11 +203,12 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     both[counts.columns] = counts
     road, road_base = both["TP"] + both["FN"], both["TP_base"] + both["FN_base"]
     other, other_base = both["TN"] + both["FP"], both["TN_base"] + both["FP_base"]
-    same, known = (road == road_base) & (other == other_base), road + other > 0
-    both = both.assign(same=same, known=known, there=both["in"] != "left_only")
-    parts = grouped(both, [*by, "region"])
-    shared = parts["same"].transform("all") & parts[["known", "there"]].transform("any").all(axis=1)
-    both = both[shared & both["known"]].sort_values("pair", kind="stable")
+    same, labelled = (road == road_base) & (other == other_base), road + other > 0
+    both = both.assign(same=same, labelled=labelled, in_new=both["in"] != "left_only")
+    parts = group_rows(both, [*by, "region"])
+    in_both = parts[["labelled", "in_new"]].transform("any").all(axis=1)
+    shared = parts["same"].transform("all") & in_both
+    both = both[shared & both["labelled"]].sort_values("pair", kind="stable")
     stamps = numbered.set_index("pair")["stamp_ns"].reindex(both["pair"]).to_numpy()
     both = both.assign(stamp_ns=stamps, final=True)
     tested = {TESTED: METRICS[TESTED]}
@@ -222,7 +217,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
 
 @dataclass(frozen=True)
 class MovedFrame:
-    """A frame whose final ERR changed much: that of the base and of the new result."""
+    """A frame whose final ERR changed much from the base to the new result."""
 
     result: str
     variant: str
@@ -243,16 +238,16 @@ class Disagreement:
     stamp_ns: int
     base_right: float
     new_right: float
-    """Shares of its labelled pixels that the base's mask, or the new one's, alone has right."""
+    """Shares of its labelled pixels that only the base's mask, or only the new one, has right."""
 
 
 def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
     """Yield the frames whose ERR changed most, of the first final mask."""
-    pairs = next((rows for _, rows in grouped(only(pairs, final=True), MASK)), pairs)
+    pairs = next((rows for _, rows in group_rows(only(pairs, final=True), MASK)), pairs)
     base = pairs[f"{TESTED}_base"]
     pairs = pairs.assign(before=base, change=pairs[TESTED] - base)
     for harmed in (True, False):
-        for row in most_changed(pairs, NAMED, harmed=harmed).to_dict("records"):
+        for row in most_changed_frames(pairs, NAMED, harmed=harmed).to_dict("records"):
             was, change = row["before"], row["change"]
             about = row["variant"], row["frame"], row["stamp_ns"]
             yield MovedFrame(result, *about, was, was + change, change)
@@ -261,9 +256,9 @@ def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
 def disagreements(
     table: pd.DataFrame, pairs: pd.DataFrame, base: str, new: str
 ) -> Iterator[Disagreement]:
-    """Yield the frames on which two variants of a run disagree most; of neighbours only one.
+    """Yield the frames on which two variants of a run disagree most, but one of neighbours only.
 
-    ``table`` has the rows of ``disagreements``; only the frames of ``pairs`` are looked at.
+    ``table`` has the rows of ``disagreements``; only the frames of ``pairs`` are considered.
     """
     sides = ((base, new, "repaired", "spoiled"), (new, base, "spoiled", "repaired"))
     stamps = pairs[["frame", "stamp_ns"]].drop_duplicates()
@@ -272,6 +267,6 @@ def disagreements(
         rows = rows[rows["N"] > 0].merge(stamps, on="frame")
         mine, theirs = rows[new_right] / rows["N"], rows[base_right] / rows["N"]
         rows = rows.assign(mine=mine, theirs=theirs, change=mine + theirs)
-        for row in most_changed(rows, NAMED, harmed=True).to_dict("records"):
+        for row in most_changed_frames(rows, NAMED, harmed=True).to_dict("records"):
             right = row["theirs"], row["mine"]
             yield Disagreement(new, new, row["frame"], row["stamp_ns"], *right)

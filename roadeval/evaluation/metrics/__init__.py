@@ -16,37 +16,37 @@ import numpy as np
 from roadeval.data import Counts
 from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation.metric import Metric, Shown
-from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.discovery import by_name, collect
 
 ALL: Final[Mapping[str, Metric]] = by_name(
     sorted(
-        chain(*found_in(sys.modules[__name__], "METRICS")),
+        chain(*collect(sys.modules[__name__], "METRICS")),
         key=lambda metric: (metric.order, metric.name),
     )
 )
 METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}
 """The columns of the tables, in their order."""
 TESTED: Final = "ERR"
-"""The rate whose differences are findings. Those of the final masks against one base are a family,
-and corrected for their number; other rates and stages say where a finding comes from."""
+"""The rate whose differences are findings. Differences of final masks against one base are a
+family, and corrected for their number; other rates and stages explain a finding."""
 OVERLAP: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}
-"""Metrics beyond the paper's, which are computed of sums alone."""
+"""Metrics beyond the paper's, which are computed from sums only."""
 
 
-def _read(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
-    """Return the metrics that people see there, in the order in which they read them."""
+def _shown(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
+    """Return the metrics that people see in a place, in the order in which they read them."""
     ranked = sorted(metrics.values(), key=lambda metric: metric.rank)
     return {metric.name: metric for metric in ranked if metric.shown >= least}
 
 
-SHORT: Final = _read(METRICS, Shown.EVERYWHERE)
-"""The rates of short tables, of lists, graphs and charts."""
-FULL: Final = _read(METRICS, Shown.IN_FULL)
-"""The rates of a mask where there is room for all."""
-SHORT_OVERLAP: Final = _read(OVERLAP, Shown.EVERYWHERE)
-"""Of the metrics without a column in tables, those that go with `SHORT`."""
+SHORT: Final = _shown(METRICS, Shown.EVERYWHERE)
+"""The rates of short tables, lists, graphs and charts."""
+FULL: Final = _shown(METRICS, Shown.IN_FULL)
+"""The rates of tables that show all of a mask."""
+SHORT_OVERLAP: Final = _shown(OVERLAP, Shown.EVERYWHERE)
+"""The metrics without a column in tables that are shown beside `SHORT`."""
 COMPARED: Final = tuple(name for name in METRICS if name in FULL)
-"""The metrics whose paired differences are given, in the order of the columns."""
+"""The metrics that have paired differences, in the order of the columns."""
 
 
 def of(counts: Counts) -> dict[str, float]:
@@ -58,7 +58,7 @@ def table(counts: Sums, metrics: Mapping[str, Metric] = METRICS) -> Floats:
     """Compute metrics of many frames at once, exactly as `of` does.
 
     ``counts`` are ``(n, 4)``: TP, TN, FP, FN. Returned is ``(n, m)`` float64 in the order of
-    ``metrics``; NaN where a metric is undefined.
+    ``metrics``; NaN if a metric is undefined.
     """
     columns = Counts(*counts.T)
     with np.errstate(invalid="ignore"):

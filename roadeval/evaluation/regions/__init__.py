@@ -12,14 +12,14 @@ from typing import Final
 
 from roadeval.data.arrays import Bits
 from roadeval.evaluation.region import LabelledFrame, Region
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 ALL: Final = "all"
-"""The name of the whole frame where sums are by region."""
+"""The name of the whole frame in sums by region."""
 HALVES: Final = ("boundary", "interior")
 """Regions that together are the whole frame."""
 REGIONS: Final[tuple[Region, ...]] = tuple(
-    sorted(chain(*found_in(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
+    sorted(chain(*collect(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
 )
 
 
@@ -31,8 +31,8 @@ def of_frame(labelled: LabelledFrame) -> dict[str, Bits]:
 def titles(names: Collection[str], height: int = 0) -> dict[str, str]:
     """Return the titles of some regions for people, in order.
 
-    A region that no file defines, as of a stage from elsewhere, is its own title. ``height`` is
-    that of the images in pixels, 0 if it is not known.
+    The title of a region that no file defines is its name. ``height`` is the height of the images
+    in pixels, or 0 if it is not known.
     """
-    known = {n: title for r in REGIONS for n, title in r.titled(names, height).items()}
-    return known | {name: name.replace("_", " ") for name in names if name not in known}
+    defined = {n: title for r in REGIONS for n, title in r.titles_of(names, height).items()}
+    return defined | {name: name.replace("_", " ") for name in names if name not in defined}

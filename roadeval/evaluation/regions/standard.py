@@ -21,11 +21,10 @@ SHADOW_TITLES: Final = {
 }
 
 
-def detected(labelled: LabelledFrame) -> dict[str, Bits]:
-    """Collect the regions that stages handed out.
+def detected_regions(labelled: LabelledFrame) -> dict[str, Bits]:
+    """Return the regions that stages computed.
 
-    The first variant that has a region of a name gives it to all: variants are compared on the
-    same pixels.
+    Those of the first variant hold for all, so that variants are compared on the same pixels.
     """
     masks: dict[str, Packed] = {}
     for variant in labelled.variants:
@@ -36,7 +35,7 @@ def detected(labelled: LabelledFrame) -> dict[str, Bits]:
 
 
 def true_shadow(labelled: LabelledFrame) -> dict[str, Bits]:
-    """Return the truly shadowed pixels, where there is a truth of shadow."""
+    """Return the truly shadowed pixels, if there is a truth of shadow."""
     shadow = labelled.frame.shadow_truth
     if shadow is None:
         return {}
@@ -47,28 +46,28 @@ def boundary(truth: TruthBits, width: int) -> Bits:
     """Mark the pixels within ``width`` of the edge between road and non-road, ``(H, words)``.
 
     A pixel belongs to it if the square of side ``2 * width + 1`` around it holds both road and
-    non-road of the truth. An ignored pixel is neither, so where road meets ignored pixels there
-    is no edge.
+    non-road of the truth. An ignored pixel is neither, so there is no edge between road and ignored
+    pixels.
     """
     element = square(width)
     return grow(truth.road, element, truth) & grow(truth.other, element, truth)
 
 
-def _halves(labelled: LabelledFrame) -> dict[str, Bits]:
+def _boundary_and_interior(labelled: LabelledFrame) -> dict[str, Bits]:
     near = boundary(labelled.truth, labelled.settings.boundary_width)
     return {"boundary": near, "interior": near ^ everywhere(labelled.truth.shape)}
 
 
 @lru_cache(maxsize=8)
 def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
-    """Cut an image's rows into stripes of equal height to within a row, ``(H, words)`` each.
+    """Divide an image's rows into stripes of equal height to within a row, ``(H, words)`` each.
 
     ``shape`` is height and width in pixels; ``band_0`` is the topmost stripe.
     """
     stripe = np.arange(shape[0]) * bands // shape[0]
-    whole = everywhere(shape)
+    image = everywhere(shape)
     return {
-        f"band_{index}": np.where((stripe == index)[:, None], whole, np.uint64(0))
+        f"band_{index}": np.where((stripe == index)[:, None], image, np.uint64(0))
         for index in range(bands)
     }
 
@@ -85,8 +84,8 @@ def _titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
 
 
 def _titles_of_distances(names: Collection[str], _height: int) -> dict[str, str]:
-    found = {name: match for name in names if (match := _DISTANCE.fullmatch(name))}
-    titles = {name: f"{match[1]} to {match[2]} m ahead" for name, match in found.items()}
+    bands = [match for name in names if (match := _DISTANCE.fullmatch(name))]
+    titles = {match[0]: f"{match[1]} to {match[2]} m ahead" for match in bands}
     if UNPLACED in names:
         titles[UNPLACED] = "farther away, or above the horizon"
     return titles
@@ -94,12 +93,12 @@ def _titles_of_distances(names: Collection[str], _height: int) -> dict[str, str]
 
 _DISTANCE: Final = re.compile(r"(\d+)-(\d+)m")
 REGIONS: Final = (
-    Region(SHADOW_TITLES, order=10, find=detected),
+    Region(SHADOW_TITLES, order=10, find=detected_regions),
     Region({"true_shadow": "inside true shadow"}, order=20, find=true_shadow),
     Region(
         {"boundary": "near the road's edge", "interior": "away from the road's edge"},
         order=30,
-        find=_halves,
+        find=_boundary_and_interior,
     ),
     Region(
         _titles_of_bands,

@@ -1,39 +1,33 @@
-"""Pixels by outcome (section 5), counted and summed over frames; edges, flicker and episodes."""
+"""Pixels of a frame by outcome (section 5), changes from mask to mask, edges and flicker."""
 
 from __future__ import annotations
 
 import math
-from array import array
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise, zip_longest
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from collections.abc import Mapping, Sequence
+from itertools import chain, pairwise, permutations
+from typing import Any, Final
 
 import numpy as np
 
 from roadeval.data import (
     ERRORS,
-    OUTCOMES,
+    Change,
     Contour,
-    Counts,
     FrameResult,
     Layer,
     Mask,
     Packed,
     Role,
+    Transition,
     Truth,
     TruthBits,
     everywhere,
     ones,
 )
-from roadeval.data.arrays import IGNORED, Bits, Floats, Sums
-from roadeval.evaluation import metrics
+from roadeval.data.arrays import IGNORED, Bits, Sums
 from roadeval.evaluation.region import disk, grow, square
-from roadeval.evaluation.tables import rates_of
 from roadeval.kernels import KERNELS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Name = tuple[str, str]
 """A mask's variant and stage."""
@@ -42,9 +36,9 @@ Name = tuple[str, str]
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
     """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
 
-    ``masks`` are ``(K, H, words)``: road. Ignored pixels are in no count. ``regions`` are R of
-    ``(H, words)``, which may overlap. Returned are ``(K, 1 + R, 4)`` int64: of each mask the whole
-    frame's four, then each region's.
+    ``masks`` are ``(K, H, words)``: road. Ignored pixels are in no count. ``regions`` are R masks,
+    ``(H, words)`` each, which may overlap. Returned are ``(K, 1 + R, 4)`` int64: for each mask the
+    four counts of the whole frame, then of each region.
     """
     inside = flat([everywhere(truth.shape), *regions])
     classes = flat([truth.road, truth.other])
@@ -56,114 +50,59 @@ def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
 def error_map(mask: Mask, truth: Truth) -> Layer:
     """Classify each pixel by its outcome, as in `roadeval.data.ERRORS`.
 
-    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` too, and 255 where it is ignored.
+    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` is alike, but 255 for ignored pixels.
     """
-    # TN 0 and TP 1 where the two agree, FP 2 and FN 3 where not; beyond 4 what is ignored.
+    # TN 0 and TP 1 if the two agree, else FP 2 and FN 3; ignored pixels are beyond 4.
     return Layer(ERRORS, np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED)))
 
 
 def flat(masks: Bits | Sequence[Bits]) -> Bits:
-    """Lay each mask's rows one after the other: ``(K, H * words)``."""
+    """Concatenate the rows of each mask: ``(K, H * words)``."""
     stacked = np.asarray(masks, np.uint64)
     return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
 
 
-class CountedRows:
-    """Counts of masks, added frame by frame: 24 bytes a mask and frame, until they are a table."""
+def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Transition, Change]:
+    """Count what each stage changed in the mask before it, and each final mask in the others.
 
-    def __init__(self, *names: str) -> None:
-        self._names: Final = names
-        """Which names a row has, such as variant and stage."""
-        self._rows: Final = array("I")
-        """Place of the frame, place of its names, and the four counts, again and again."""
-        self._places: Final[dict[tuple[str, ...], int]] = {}
-
-    def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], Counts]]) -> None:
-        """Add the counts of the evaluated frame at a place, by their names."""
-        for names, four in counts:
-            row = self._places.setdefault(names, len(self._places))
-            self._rows.extend((place, row, *four))
-
-    def table(self, when: pd.DataFrame, orders: Mapping[str, Sequence[str]]) -> pd.DataFrame:
-        """Return the rows with their rates, as they came.
-
-        ``when`` has what is known of each frame at its place; ``orders`` are by column the order of
-        names that are not in that of their first row.
-        """
-        import pandas as pd
-
-        rows = np.array(self._rows, np.int64).reshape(-1, 6)
-        table = when.iloc[rows[:, 0]].reset_index(drop=True)
-        columns = [*zip(*self._places, strict=True)] or [()] * len(self._names)
-        for name, words in zip(self._names, columns, strict=True):
-            order = orders.get(name) or [*dict.fromkeys(words)]
-            codes = np.array([order.index(word) for word in words], np.int64)[rows[:, 1]]
-            table[name] = pd.Categorical.from_codes(codes, pd.Index([*order]))
-        table[[*OUTCOMES]] = rows[:, 2:]
-        table["N"] = rows[:, 2:].sum(axis=1)
-        return table.join(rates_of(table, metrics.METRICS))
-
-
-def episodes(stamps: Sums, errors: Floats, limit: float) -> dict[str, Any]:
-    """Return for how long a drive's ERR was at or above a limit, and when it recovered.
-
-    ``stamps`` are ``(n,)`` nanoseconds of evaluated frames, ``errors`` their ERR; one that is NaN
-    says nothing. An episode lasts from its first frame to the first one below the limit, where it
-    has ``recovered``. Where the drive's end or a gap comes before, of more than a second and three
-    usual steps, it has not, and lasts to its last frame. Times are in seconds, those of gaps in
-    none; ``share`` is of the drive, ``recovery`` the median of the episodes that recovered.
+    ``names`` are variant and stage of each mask, a variant's stages in the order they ran;
+    ``masks`` are ``(K, H, words)``. Ignored pixels are in no count.
     """
-    known = np.flatnonzero(~np.isnan(errors))
-    known = known[np.argsort(stamps[known], kind="stable")]
-    steps = np.diff(stamps[known])
-    gap = max(1_000_000_000, 3 * np.median(steps)) if len(steps) else 0
-    lasting, times, recovered = False, [0.0] * 0, [0.0] * 0
-    for error, step in zip_longest(errors[known].tolist(), steps.tolist(), fillvalue=math.inf):
-        if error >= limit and not lasting:
-            times.append(0)
-        elif error < limit and lasting:
-            recovered.append(times[-1])
-        lasting = error >= limit and step <= gap
-        if lasting:
-            times[-1] += step
-    return {
-        "limit": limit,
-        "episodes": len(times),
-        "recovered": len(recovered),
-        "seconds": sum(times) / 1e9,
-        "share": sum(times) / (int(steps[steps <= gap].sum()) or math.nan),
-        "longest": max(times, default=0) / 1e9,
-        "recovery": float(np.median(recovered)) / 1e9 if recovered else None,
-    }
+    labelled = truth.labelled
+    wrong = flat((masks ^ truth.road) & labelled)
+    both = KERNELS.count_bits(wrong, wrong, flat([everywhere(truth.shape)]))[..., 0].tolist()
+    steps = [(n, n + 1) for n in range(len(names) - 1) if names[n][0] == names[n + 1][0]]
+    finals = {variant: place for place, (variant, _) in enumerate(names)}
+    pixels, transitions = ones(labelled), {}
+    for before, after in chain(steps, permutations(finals.values(), 2)):
+        repaired, spoiled = (both[place][place] - both[before][after] for place in (before, after))
+        transitions[*names[before], *names[after]] = Change(repaired, spoiled, pixels)
+    return transitions
 
 
 TRIMAP: Final = (1, 2, 4, 8, 16, 32)
 """Widths around the truth's edge, in pixels, in which errors are counted."""
 
 
-class _Sums(NamedTuple):
-    """Of one variant."""
+class _VariantSums:
+    """Sums over the frames of one variant."""
 
-    scores: Floats
-    frames: Sums
-    """``(2,)``: boundary F and boundary IoU, and the frames that have each."""
-    trimap: Sums
-    pairs: Sums
-    """``(4,)``: pairs of frames; the pixels that both label; where the mask, and where the truth
-    changes."""
-
-
-def _no_sums() -> _Sums:
-    shapes = (2,), (len(TRIMAP), 2), (4,)
-    return _Sums(np.zeros(2), *(np.zeros(shape, np.int64) for shape in shapes))
+    def __init__(self) -> None:
+        self.scores = np.zeros(2)
+        self.frames = np.zeros(2, np.int64)
+        """Boundary F and boundary IoU, and the frames that have each."""
+        self.trimap = np.zeros((len(TRIMAP), 2), np.int64)
+        self.pairs = np.zeros(4, np.int64)
+        """Pairs of frames; the pixels that both label; those that change in the mask, and in the
+        truth."""
 
 
 class EdgesAndFlicker:
     """Sums up boundary F, boundary IoU, trimap and flicker of every final mask.
 
     ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
-    ``L_t`` are the pixels that both truths label. ``truth_flicker`` is the truth's own: moving
-    things must change, and only what exceeds that is flicker. Motion is not removed by optical
+    ``L_t`` are the pixels that both truths label. ``truth_flicker`` is that of the truth: what
+    moves must change, and only changes beyond it are flicker. Motion is not removed by optical
     flow, as it is in [1]_. ``width`` is the tolerance of boundary F in pixels.
 
     References
@@ -174,7 +113,7 @@ class EdgesAndFlicker:
 
     def __init__(self, width: int) -> None:
         self._width = width
-        self._sums = defaultdict[str, _Sums](_no_sums)
+        self._sums = defaultdict[str, _VariantSums](_VariantSums)
         self._before: tuple[TruthBits, Mapping[str, Packed]] | None = None
 
     def add(self, result: FrameResult) -> None:
@@ -184,10 +123,10 @@ class EdgesAndFlicker:
             self.interrupt()
             return
         for name, (*scores, counts) in result.contours.items():
-            own = self._sums[name]
-            own.scores[:] += np.nan_to_num(scores)
-            own.frames[:] += ~np.isnan(scores)
-            own.trimap[:] += counts
+            sums = self._sums[name]
+            sums.scores += np.nan_to_num(scores)
+            sums.frames += ~np.isnan(scores)
+            sums.trimap += counts
         masks = {v.variant: mask for v in result.variants for _, mask in v.masks()}
         before, self._before = self._before, (now, masks)
         if before is None or before[0].shape != now.shape:
@@ -196,35 +135,35 @@ class EdgesAndFlicker:
         count, moved = ones(labelled), ones((now.road ^ before[0].road) & labelled)
         for name in masks.keys() & before[1].keys():
             changed = ones((masks[name].bits ^ before[1][name].bits) & labelled)
-            self._sums[name].pairs[:] += 1, count, changed, moved
+            self._sums[name].pairs += 1, count, changed, moved
 
     def interrupt(self) -> None:
         """Note that the next frame does not follow the one before."""
         self._before = None
 
     def totals(self) -> dict[str, dict[str, Any]]:
-        """Return by variant: mean ``boundary_F`` over the ``frames`` that have it, and the flicker.
+        """Return by variant what is summed up; None is undefined.
 
-        So too ``boundary_IoU``; ``trimap`` has the pixels of all frames. Undefined is None. The
-        baseline, whose mask is always the same, has no flicker.
+        ``boundary_F`` and ``boundary_IoU`` are means over the frames that have them, ``trimap`` has
+        the pixels of all frames. The baseline, whose mask is always the same, has no flicker.
         """
-        found = {}
-        for name, own in self._sums.items():
-            pairs, labelled, *moved = own.pairs.tolist()
-            scores, frames = own.scores.tolist(), own.frames.tolist()
+        totals = {}
+        for name, sums in self._sums.items():
+            pairs, labelled, *moved = sums.pairs.tolist()
+            scores, frames = sums.scores.tolist(), sums.frames.tolist()
             f, iou = (s / n if n else None for s, n in zip(scores, frames, strict=True))
             flicker, of_truth = (pixels / labelled if labelled else None for pixels in moved)
-            found[name] = {
+            totals[name] = {
                 "boundary_F": f,
                 "frames": frames[0],
                 "width": self._width,
                 "boundary_IoU": iou,
-                "trimap": dict(zip(map(str, TRIMAP), own.trimap.tolist(), strict=True)),
+                "trimap": dict(zip(map(str, TRIMAP), sums.trimap.tolist(), strict=True)),
                 "flicker": flicker,
                 "truth_flicker": of_truth,
                 "pairs": pairs,
             }
-        return found
+        return totals
 
 
 def contours(
@@ -234,12 +173,12 @@ def contours(
 
     Boundary F is ``F = 2 P R / (P + R)`` [1]_ [2]_. P is the share of the mask's edge pixels that
     lie within ``width`` of the truth's edge, R the share of the truth's edge pixels within
-    ``width`` of the mask's, in pixels of Euclidean distance. 0 if only one of the two has an edge,
-    NaN if neither has.
+    ``width`` of the mask's, in pixels of Euclidean distance. It is 0 if only one of the two has an
+    edge, NaN if neither has.
 
-    Boundary IoU is that of the bands of road along the two edges [3]_. A band is as wide as 2 % of
-    the diagonal, in chessboard distance; as in the authors' code the image's border is an edge. NaN
-    where both bands are empty.
+    Boundary IoU is the IoU of the bands of road along the two edges [3]_. A band is as wide as 2 %
+    of the diagonal, in chessboard distance; as in the authors' code the image's border is an edge.
+    It is NaN if both bands are empty.
 
     The trimap [4]_, ``(w, 2)``, counts the wrong pixels and all labelled ones within ``widths``,
     rising, of the truth's edge: a pixel is within a width if the square of side ``2 * width + 1``
@@ -259,22 +198,22 @@ def contours(
     """
     labelled, element = truth.labelled, square(max(1, round(0.02 * math.hypot(*truth.shape))))
 
-    def band(own: TruthBits) -> Bits:
-        inside = everywhere(truth.shape) ^ own.other
-        return own.road & ~KERNELS.erode(inside, element, truth.shape[1])
+    def band(labels: TruthBits) -> Bits:
+        inside = everywhere(truth.shape) ^ labels.other
+        return labels.road & ~KERNELS.erode(inside, element, truth.shape[1])
 
     true_edge, true_band = edge_of(truth), band(truth)
     near_truth, q = grow(true_edge, disk(width), truth), ones(true_edge)
-    road, other, near, found = truth.road, truth.other, [], {}
+    road, other, near, by_mask = truth.road, truth.other, [], {}
     for before, after in pairwise((0, *widths)):
         # A square grown by a square is the square of both widths.
-        road, other = (grow(each, square(after - before), truth) for each in (road, other))
+        road, other = (grow(side, square(after - before), truth) for side in (road, other))
         near.append(road & other)
     counted = flat([labelled, *(mask ^ truth.road for mask in masks.values())])
-    whole, *wrong = KERNELS.count_bits(counted, flat([labelled]), flat(near))[:, 0]
+    pixels, *wrong = KERNELS.count_bits(counted, flat([labelled]), flat(near))[:, 0]
     for (name, mask), errors in zip(masks.items(), wrong, strict=True):
-        own = TruthBits(truth.shape, mask & labelled, labelled & ~mask)
-        edge, own_band = edge_of(own), band(own)
+        labels = TruthBits(truth.shape, mask & labelled, labelled & ~mask)
+        edge, mask_band = edge_of(labels), band(labels)
         p, score = ones(edge), math.nan
         if p and q:
             recall = ones(true_edge & grow(edge, disk(width), truth)) / q
@@ -283,10 +222,10 @@ def contours(
             score = 2 * precision * recall / both if both else 0.0
         elif p or q:
             score = 0.0
-        union = ones(own_band | true_band)
-        overlap = ones(own_band & true_band) / union if union else math.nan
-        found[name] = score, overlap, np.stack([errors, whole], axis=1)
-    return found
+        union = ones(mask_band | true_band)
+        overlap = ones(mask_band & true_band) / union if union else math.nan
+        by_mask[name] = score, overlap, np.stack([errors, pixels], axis=1)
+    return by_mask
 
 
 def edge_of(labels: TruthBits) -> Bits:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,10 +14,8 @@ from roadeval.data import (
     ROAD,
     Counts,
     Frame,
-    FrameMetres,
     FrameResult,
     Health,
-    Histogram,
     Packed,
     Probability,
     Role,
@@ -34,9 +30,8 @@ from roadeval.data.result import Cells
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
-from roadeval.evaluation.score.counts import Name, contours, count, error_map
+from roadeval.evaluation.score.counts import Name, changes, contours, count, error_map
 from roadeval.evaluation.score.metres import measure
-from roadeval.evaluation.score.thresholds import changes
 from roadeval.evaluation.score.unlabelled import doubts_of
 from roadeval.evaluation.settings import (
     DEGRADED_ERR,
@@ -46,10 +41,6 @@ from roadeval.evaluation.settings import (
     EvaluationSettings,
 )
 from roadeval.geometry.ground import Ground
-
-K = TypeVar("K", str, int)
-"""What further masks are of: the stage that was replaced by the truth, or a training's seed."""
-Rates = Mapping[str, float]
 
 
 def score_frame(
@@ -61,116 +52,114 @@ def score_frame(
     *,
     ground: Ground | None = None,
 ) -> FrameResult:
-    """Score one frame; one that is not `EVALUATED` is passed on without counts.
+    """Score one frame as its role demands; only an `EVALUATED` one is counted, and needs a truth.
 
-    Of a training frame it counts alone how probable its road and the rest are, of one without truth
-    how much each mask is in doubt, of one that was picked by rank the ERR, apart from all counts.
-
-    A frame must have a truth if its role is `EVALUATED`. A variant's final mask is that of its last
-    stage. ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on;
-    ``ground`` is what is before the camera, where that is known.
+    A training frame tells how probable its road and the rest are, a frame without truth how much
+    each mask is in doubt, and a frame that was picked by rank its ERR, apart from all counts. A
+    variant's final mask is that of its last stage. ``prior`` is the ``blind`` baseline, or None if
+    no frame with truth was trained on; ``ground`` is what lies before the camera, if it is known.
     """
-    if role is Role.TRAINING and frame.truth is not None:
-        found = _by_stage(variants, partial(histogram, truth=frame.truth))
-        return FrameResult(frame, role, variants, histograms=found)
+    result, truth = FrameResult(frame, role, variants), frame.truth
     if role is Role.UNLABELLED:
-        return FrameResult(frame, role, variants, doubts=doubts_of(variants))
-    if role is Role.PICKED and frame.truth is not None:
-        return FrameResult(frame, role, variants, **_apart(frame.truth, variants))
-    if role is not Role.EVALUATED:
-        return FrameResult(frame, role, variants)
-    if frame.truth is None:
-        raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
-    truth = TruthBits.of(frame.truth)
-    masks = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
-    if prior is not None:
-        masks[BASELINE, FINAL_STAGE] = prior.mask(truth.shape)
-    names, bits = list(masks), truth.bits_of(masks.values())
-    survey = survey_of(ground, settings, truth.shape) if ground else None
-    labelled = LabelledFrame(frame, truth, variants, settings, survey)
-    tallies = tally(names, bits, truth, regions.of_frame(labelled))
-    finals = {result.variant: result.rates for result in tallies}
-    blind = finals.pop(BASELINE, None)
-    final_bits = {variant: mask for (variant, _), mask in zip(names, bits, strict=True)}
-    metres = measure(survey, final_bits, truth) if survey else {}
-    last = dict(names)
-    return FrameResult(
-        frame,
-        role,
-        variants,
-        errors={v.variant: error_map(v.final(), frame.truth) for v in variants},
-        tallies=tuple(_with_ground(each, metres, last) for each in tallies),
-        health={name: judge(own, blind) for name, own in finals.items()},
-        truth_bits=truth,
-        changes=changes(names, bits, truth),
-        contours=contours(final_bits, truth, settings.boundary_width),
-        histograms=_by_stage(variants, partial(histogram, truth=frame.truth)),
-        oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
-        metres=metres,
-        above=_by_stage(variants, partial(survey.levels, truth=frame.truth)) if survey else {},
+        return replace(result, doubts=doubts_of(variants))
+    if truth is None:
+        if role is Role.EVALUATED:
+            raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
+        return result
+    if role is Role.TRAINING:
+        by_stage = _probabilities(variants).items()
+        return replace(result, histograms={name: histogram(p, truth) for name, p in by_stage})
+    if role is Role.EVALUATED:
+        return _evaluate(result, truth, settings, prior, ground)
+    if role is not Role.PICKED:
+        return result
+    finals = {(v.variant, FINAL_STAGE): Packed.of(v.final()) for v in variants}
+    bits = TruthBits.of(truth)
+    tallies = tally([*finals], bits.bits_of(finals.values()), bits)
+    return replace(
+        result,
+        apart={final.variant: final.rates["ERR"] for final in tallies},
+        errors={v.variant: error_map(v.final(), truth) for v in variants},
     )
 
 
-def _with_ground(tally: Tally, metres: Mapping[str, FrameMetres], last: Mapping[str, str]) -> Tally:
-    """Return a final mask's tally with its cells of the ground seen from above as a region."""
-    if tally.variant not in metres or last[tally.variant] != tally.stage:
-        return tally
-    counts = Counts(*metres[tally.variant].counts[0, -1].tolist())
-    return replace(tally, regions={**tally.regions, ABOVE: counts})
+def _evaluate(
+    result: FrameResult,
+    truth: Truth,
+    settings: EvaluationSettings,
+    prior: BlindPrior | None,
+    ground: Ground | None,
+) -> FrameResult:
+    """Return the result with all that is counted of an evaluated frame."""
+    frame, variants, labels = result.frame, result.variants, TruthBits.of(truth)
+    masks = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
+    if prior is not None:
+        masks[BASELINE, FINAL_STAGE] = prior.mask(labels.shape)
+    names, bits = [*masks], labels.bits_of(masks.values())
+    final_bits = {variant: mask for (variant, _), mask in zip(names, bits, strict=True)}
+    survey = survey_of(ground, settings, labels.shape) if ground else None
+    labelled = LabelledFrame(frame, labels, variants, settings, survey)
+    tallies = tally(names, bits, labels, regions.of_frame(labelled))
+    metres = measure(survey, final_bits, labels) if survey else {}
+    last_places = {variant: place for place, (variant, _) in enumerate(names)}
+    for variant, measures in metres.items():
+        final = tallies[last_places[variant]]
+        with_cells = {**final.regions, ABOVE: Counts(*measures.counts[0, -1].tolist())}
+        tallies[last_places[variant]] = replace(final, regions=with_cells)
+    rates = {mask.variant: mask.rates for mask in tallies}  # a variant's final mask is its last
+    blind = rates.pop(BASELINE, None)
+    replaced: dict[str, dict[Name, Packed]] = {}
+    for v in variants:
+        for oracle, oracle_masks in v.oracles.items():
+            by_stage = {(v.variant, stage): mask for stage, mask in oracle_masks.items()}
+            replaced.setdefault(oracle, {}).update(by_stage)
+    probabilities = _probabilities(variants).items()
+    return replace(
+        result,
+        errors={v.variant: error_map(v.final(), truth) for v in variants},
+        tallies=tuple(tallies),
+        health={variant: judge(final, blind) for variant, final in rates.items()},
+        truth_bits=labels,
+        changes=changes(names, bits, labels),
+        contours=contours(final_bits, labels, settings.boundary_width),
+        histograms={name: histogram(p, truth) for name, p in probabilities},
+        oracles={
+            oracle: tuple(tally([*stages], labels.bits_of(stages.values()), labels))
+            for oracle, stages in replaced.items()
+        },
+        metres=metres,
+        above={name: survey.levels(p, truth) for name, p in probabilities} if survey else {},
+    )
 
 
-def _apart(truth: Truth, variants: Iterable[VariantResult]) -> dict[str, Any]:
-    """Return the final masks' ERR and error maps, as parts of `FrameResult`."""
-    finals = {(each.variant, FINAL_STAGE): Packed.of(each.final()) for each in variants}
-    bits = TruthBits.of(truth)
-    found = tally(list(finals), bits.bits_of(finals.values()), bits, {})
+def _probabilities(variants: Sequence[VariantResult]) -> dict[Name, Probability]:
+    """Return how probable road is, for each stage that says so."""
     return {
-        "apart": {each.variant: each.rates["ERR"] for each in found},
-        "errors": {each.variant: error_map(each.final(), truth) for each in variants},
-    }
-
-
-def _by_stage(
-    variants: Iterable[VariantResult], counted: Callable[[Probability], Histogram]
-) -> dict[Name, Histogram]:
-    """Return what is counted of each stage that says how probable road is."""
-    return {
-        (variant.variant, each.stage): counted(each.output.probability)
+        (variant.variant, result.stage): result.output.probability
         for variant in variants
-        for each in variant.stages
-        if each.output.probability is not None
+        for result in variant.stages
+        if result.output.probability is not None
     }
 
 
 def tally(
-    names: Sequence[Name], masks: Bits, truth: TruthBits, found: Mapping[str, Bits]
-) -> tuple[Tally, ...]:
-    """Count named masks in the whole frame and in the regions ``found``."""
-    counted = count(masks, truth, list(found.values()))
+    names: Sequence[Name],
+    masks: Bits,
+    truth: TruthBits,
+    by_name: Mapping[str, Bits] | None = None,
+) -> list[Tally]:
+    """Count named masks, ``(K, H, words)``, in the whole frame and in regions by their names."""
+    by_name = by_name or {}
+    counted = count(masks, truth, [*by_name.values()])
     tallies = []
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
-        whole, *parts = (Counts(*row) for row in rows)
-        by_region = dict(zip(found, parts, strict=True))
-        tallies.append(Tally(variant, stage, whole, by_region, metrics.of(whole)))
-    return tuple(tallies)
+        frame, *parts = (Counts(*row) for row in rows)
+        by_region = dict(zip(by_name, parts, strict=True))
+        tallies.append(Tally(variant, stage, frame, by_region, metrics.of(frame)))
+    return tallies
 
 
-def _tallies(
-    variants: Mapping[str, Mapping[K, Mapping[str, Packed]]], truth: TruthBits
-) -> dict[K, tuple[Tally, ...]]:
-    """Count the variants' further masks, each by what it is of and by its stage."""
-    named: dict[K, dict[Name, Packed]] = {}
-    for variant, further in variants.items():
-        for key, masks in further.items():
-            for stage, mask in masks.items():
-                named.setdefault(key, {})[variant, stage] = mask
-    return {
-        key: tally(list(masks), truth.bits_of(masks.values()), truth, {})
-        for key, masks in named.items()
-    }
-
-
-def judge(rates: Rates, blind: Rates | None) -> Health:
+def judge(rates: Mapping[str, float], blind: Mapping[str, float] | None) -> Health:
     """Return a variant's health by its final mask's rates and the baseline's, if there is one.
 
     An undefined rate counts neither for nor against it. `roadeval.evaluation.settings` gives the
@@ -188,31 +177,31 @@ class BlindPrior:
 
     road: Values
     """``(H, W)`` float32: the share of the training frames in which a pixel was road, among those
-    that label it; 0 where none does."""
+    that label it; 0 if none does."""
 
     @classmethod
     def of_truths(cls, truths: Sequence[Truth]) -> BlindPrior:
         """Average the truths, each ``(H, W)`` uint8 with 255 for ignored; a ValueError for none.
 
-        Truths of another size than the first are brought to it, nearest pixel.
+        Truths of another size than the first are resized to it, nearest pixel.
         """
         if not truths:
             raise ValueError("a prior needs at least one truth")
         road = np.zeros(truths[0].shape, np.float32)
         labelled = np.zeros_like(road)
         for truth in truths:
-            resized = _resized(truth, road.shape, mixed=False)
+            resized = _resize(truth, road.shape, mixed=False)
             road += resized == ROAD
             labelled += resized != IGNORE
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
         """Return the mask for a frame of ``shape`` (height, width): road from one half."""
-        return Packed.of(_resized(self.road, shape, mixed=True) >= 0.5)
+        return Packed.of(_resize(self.road, shape, mixed=True) >= 0.5)
 
 
-def _resized(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
-    """Return an image in another size; where its values may not be ``mixed``, the nearest."""
+def _resize(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
+    """Return an image in another size; the nearest pixels if values may not be ``mixed``."""
     if image.shape == shape:
         return image
     import cv2

@@ -1,4 +1,4 @@
-"""Measures in metres summed up over a drive, and how far a wrong camera would move them."""
+"""Measures in metres summed up over a drive, and how much a wrong camera would change them."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ CENTIMETRES: Final = 100
 _COLUMNS: Final = (
     *("variant", "measure", "where", "frames", "missing", "value", "p95", "low", "high"),
 )
-"""Those of ``metres``."""
+"""Columns of ``metres``."""
 
 
 def measure(survey: Survey, masks: Mapping[str, Bits], truth: TruthBits) -> dict[str, FrameMetres]:
     """Measure masks against the truth, ``(H, words)`` each, by name.
 
-    Of their regions the last is the ground seen from above.
+    The last of their regions is the ground seen from above.
     """
     bits = np.array([*masks.values()], np.uint64)
     inside = [band for bands in survey.bands for band in bands.values()]
@@ -52,7 +52,7 @@ class MetreSums:
         self._measures: Sequence[tuple[str, int]] = ()
         self._regions: Sequence[str] = ()
         self._differences = defaultdict[tuple[str, int], Counter[int]](Counter)
-        """By variant, and by stance and measure in a row: how often each, in centimetres."""
+        """By variant and by place among stances and measures: how often each occurs, in cm."""
         self._seen: dict[str, Sums] = {}
         """``(M,)``: frames on which the truth has the measure."""
         self._rates: dict[str, Floats] = {}
@@ -62,82 +62,84 @@ class MetreSums:
 
     def add(self, metres: Mapping[str, FrameMetres]) -> None:
         """Add a frame's measures."""
-        for variant, own in metres.items():
-            self._measures, self._regions = own.measures, own.regions
-            self._seen[variant] = self._seen.get(variant, 0) + ~np.isnan(own.ends[0, :, 1])
-            for place, metres_off in enumerate(differences_of(own).ravel().tolist()):
+        for variant, mask in metres.items():
+            self._measures, self._regions = mask.measures, mask.regions
+            self._seen[variant] = self._seen.get(variant, 0) + ~np.isnan(mask.ends[0, :, 1])
+            for place, metres_off in enumerate(differences_of(mask).ravel().tolist()):
                 if not math.isnan(metres_off):
                     self._differences[variant, place][round(metres_off * CENTIMETRES)] += 1
-            labelled, wrong = own.counts.sum(axis=2), own.counts[..., 2:].sum(axis=2)
-            known = labelled > 0
-            shares = np.divide(wrong, labelled, out=np.zeros(wrong.shape), where=known)
-            self._rates[variant] = self._rates.get(variant, 0) + np.stack([shares, known], axis=2)
-            self._above[variant] = self._above.get(variant, 0) + own.counts[0, -1]
+            labelled, wrong = mask.counts.sum(axis=2), mask.counts[..., 2:].sum(axis=2)
+            defined = labelled > 0
+            shares = np.divide(wrong, labelled, out=np.zeros(wrong.shape), where=defined)
+            self._rates[variant] = self._rates.get(variant, 0) + np.stack([shares, defined], axis=2)
+            self._above[variant] = self._above.get(variant, 0) + mask.counts[0, -1]
 
     def totals(self, curves: Curves) -> Iterator[dict[str, Any]]:
         """Yield the rows of ``metres``, variant by variant.
 
-        ``curves`` are of the ground seen from above: where a final mask is a threshold on how
-        probable road is, they give MaxF and AP11.
+        ``curves`` are of the ground seen from above: if a final mask is a threshold on how probable
+        road is, they give MaxF and AP11.
         """
-        for cells in self._rows({variant: own for (variant, _), own in curves.counts.items()}):
+        levels = {variant: counts for (variant, _), counts in curves.counts.items()}
+        for cells in self._rows(levels):
             yield dict(zip(_COLUMNS, cells, strict=True))
 
-    def _rows(self, curves: Mapping[str, Sums]) -> Iterator[tuple[Any, ...]]:
+    def _rows(self, levels: Mapping[str, Sums]) -> Iterator[tuple[Any, ...]]:
         nan = math.nan
         for variant, sums in self._rates.items():
             for place, region in enumerate(self._regions):
                 with np.errstate(invalid="ignore"):
-                    value, *ends = _ranged(sums[:, place, 0] / sums[:, place, 1])
+                    value, *ends = _with_range(sums[:, place, 0] / sums[:, place, 1])
                 yield (variant, "ERR", region, int(sums[0, place, 1]), 0, value, nan, *ends)
-            for name, value in kitti(self._above[variant], curves.get(variant)).items():
+            for name, value in kitti(self._above[variant], levels.get(variant)).items():
                 yield variant, name, ABOVE, 0, 0, value, nan, nan, nan
             for place, (measured, at) in enumerate(self._measures):
                 places = range(place, len(sums) * len(self._measures), len(self._measures))
-                every = [self._of(variant, each) for each in places]
-                value, *ends = _ranged(np.array([quantile(each, 0.5) for each in every]))
-                frames, p95 = int(self._seen[variant][place]), quantile(np.abs(every[0]), 0.95)
-                where, missing = f"{at}m" if at else "ahead", frames - len(every[0])
+                stances = [self._metres_off(variant, stance_place) for stance_place in places]
+                value, *ends = _with_range(np.array([quantile(metres, 0.5) for metres in stances]))
+                frames, p95 = int(self._seen[variant][place]), quantile(np.abs(stances[0]), 0.95)
+                where, missing = f"{at}m" if at else "ahead", frames - len(stances[0])
                 yield (variant, measured, where, frames, missing, value, p95, *ends)
 
-    def _of(self, variant: str, place: int) -> Floats:
+    def _metres_off(self, variant: str, place: int) -> Floats:
         """Return a variant's differences at a place, ``(n,)`` metres, in no order."""
         counter = self._differences[variant, place]
         counts = np.array([*counter.values()], int)
         return np.repeat(np.array([*counter], float) / CENTIMETRES, counts)
 
 
-def _ranged(every: Floats) -> tuple[float, float, float]:
-    """Return the first of the stances' values, and the least and the greatest of all."""
-    if len(every) > 1 and not np.isnan(every).any():
-        return float(every[0]), float(every.min()), float(every.max())
-    return float(every[0]), math.nan, math.nan
+def _with_range(values: Floats) -> tuple[float, float, float]:
+    """Return the value of the first stance, and the least and the greatest of all stances."""
+    if len(values) > 1 and not np.isnan(values).any():
+        return float(values[0]), float(values.min()), float(values.max())
+    return float(values[0]), math.nan, math.nan
 
 
 def differences_of(metres: FrameMetres) -> Floats:
-    """Return mask minus truth, ``(S, M)`` metres: positive where the mask reaches too far.
+    """Return mask minus truth, ``(S, M)`` metres: positive if the mask reaches too far.
 
-    Too far is to the outside of an edge of the road, or ahead.
+    Too far means beyond an edge of the road, or ahead.
     """
     outwards = [1 if measure in (LEFT, FREE) else -1 for measure, _ in metres.measures]
-    found: Floats = (metres.ends[..., 0] - metres.ends[..., 1]) * outwards
-    return found
+    differences: Floats = (metres.ends[..., 0] - metres.ends[..., 1]) * outwards
+    return differences
 
 
 def quantile(metres: Floats, share: float) -> float:
-    """Return the least of ``(n,)`` values that a share of them does not exceed; NaN without any."""
+    """Return the least value that a share of the values does not exceed; NaN without any."""
     if not len(metres):
         return math.nan
     return float(np.quantile(metres, share, method="inverted_cdf"))
 
 
 def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
-    """Compute what KITTI's road benchmark does, of cells of the ground seen from above [1]_.
+    """Compute the rates of KITTI's road benchmark from cells of the ground seen from above [1]_.
 
-    Of a mask, ``(4,)`` TP, TN, FP and FN: its ``F1``, ``precision`` and ``recall``. Given the cells
-    by how probable road is, ``(2, 256)`` as of `Survey.levels`: ``MaxF``, the greatest F1 of 256
-    thresholds, with the precision and recall there; and ``AP11``, the mean over eleven recalls from
-    0 to 1 of the greatest precision at that recall or more. NaN without road.
+    ``counts`` are a mask's TP, TN, FP and FN, ``(4,)``: they give ``F1``, ``precision`` and
+    ``recall``. ``levels`` are the cells by how probable road is, ``(2, 256)`` as of
+    `Survey.levels`: they give ``MaxF``, the greatest F1 of 256 thresholds, with the precision and
+    recall there; and ``AP11``, the mean over eleven recalls from 0 to 1 of the greatest precision
+    at that recall or more. All are NaN without road.
 
     References
     ----------
@@ -145,20 +147,20 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
        Road Detection Algorithms, ITSC 2013.
     """
     if levels is None or not levels[1].sum():
-        found = Counts(*counts.tolist())
-        rates = {name: metrics.OVERLAP[name].function(found) for name in ("F1", "precision")}
-        return {**rates, "recall": metrics.METRICS["TPR"].function(found)}
-    # Road is what has at least the probability k / 255.
+        cells = Counts(*counts.tolist())
+        rates = {name: metrics.OVERLAP[name].function(cells) for name in ("F1", "precision")}
+        return {**rates, "recall": metrics.METRICS["TPR"].function(cells)}
+    # Road are the cells of at least the probability k / 255.
     negative, positive = levels[:, ::-1].cumsum(axis=1)[:, ::-1]
-    found = positive > 0
-    precision = positive[found] / (positive + negative)[found]
-    recall = positive[found] / positive[0]
+    with_road = positive > 0
+    precision = positive[with_road] / (positive + negative)[with_road]
+    recall = positive[with_road] / positive[0]
     f = 2 * precision * recall / (precision + recall)
     best = int(f.argmax())
-    reached = [precision[recall >= least] for least in RECALLS]
+    greatest = [precision[recall >= least].max(initial=0.0) for least in RECALLS]
     return {
         "MaxF": float(f[best]),
-        "AP11": float(np.mean([each.max() if len(each) else 0.0 for each in reached])),
+        "AP11": float(np.mean(greatest)),
         "precision": float(precision[best]),
         "recall": float(recall[best]),
     }

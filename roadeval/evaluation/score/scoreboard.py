@@ -1,17 +1,19 @@
 """The scoreboard of a drive: frames are scored one by one, added in order and summed up.
 
-Its differences are every variant minus ``unfiltered`` and minus ``blind``, and what was tuned minus
-its method. The paper gives no number for figures 3a and 3b, and their curves are lost. What is left
-are claims that one mask is wrong less often than another; each window of ten frames bears one out
-or does not.
+Its differences are each variant minus ``unfiltered`` and minus ``blind``, and each tuned variant
+minus its method. The paper gives no number for figures 3a and 3b, and their curves are lost. What
+is left are claims that one mask is wrong less often than another; each window of ten frames
+confirms one or does not.
 """
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from operator import add
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,9 +23,11 @@ from roadeval.data import (
     BASELINE,
     FILTERED,
     FINAL_STAGE,
+    OUTCOMES,
     TUNED,
     UNFILTERED,
     Change,
+    Counts,
     Doubt,
     Frame,
     FrameResult,
@@ -32,16 +36,17 @@ from roadeval.data import (
     VariantResult,
     as_tree,
 )
+from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
-from roadeval.evaluation.score.counts import CountedRows, EdgesAndFlicker, Name, episodes
+from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.metres import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
-from roadeval.evaluation.stats.difference import CameraRates, Difference, holm, within_drive
-from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, paired
+from roadeval.evaluation.stats.difference import Difference, holm, within_drive
+from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, pair_rows, rates_of
 from roadeval.geometry.ground import Ground
 
 if TYPE_CHECKING:
@@ -58,21 +63,9 @@ class Effect:
     """The variant that is subtracted: one of `BASES`, or the method that was tuned."""
     variant: str
     stage: str
-    """Whose mask."""
     final: bool
     """Whether both are final masks."""
     rates: Mapping[str, Difference]
-
-
-def within(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
-    """Return the difference of a rate within a drive; pairs are as of `tables.paired`."""
-    places, names = pairs["camera"].factorize()
-    columns = [pairs[name].to_numpy() for name in ("stamp_ns", rate, f"{rate}_base")]
-    cameras = [
-        CameraRates(*(column[places == camera] for column in columns))
-        for camera in range(len(names))
-    ]
-    return within_drive(cameras, settings, higher_is_better=METRICS[rate].higher_is_better)
 
 
 def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Effect]:
@@ -90,23 +83,23 @@ def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Ef
             other = base, finals[base] if final else stage
             of_filter = (base, variant) == (UNFILTERED, FILTERED)
             if final or (of_filter and other in masks):
-                pairs = paired(
+                pairs = pair_rows(
                     only(frames, variant=base, stage=other[1]),
                     only(frames, variant=variant, stage=stage),
                     [*KEY, "frame", "stamp_ns"],
                 )
-                rates = {rate: within(pairs, rate, settings) for rate in COMPARED}
+                rates = {rate: within_drive(pairs, rate, settings) for rate in COMPARED}
                 family.append(Effect(base, variant, stage, final, rates))
-        effects += corrected(family)
+        effects += correct_effects(family)
     return effects
 
 
-def corrected(effects: Sequence[Effect]) -> list[Effect]:
-    """Correct the final masks' differences of `TESTED`, all against one base, for their number."""
-    family = iter(holm([each.rates[TESTED] for each in effects if each.final]))
+def correct_effects(effects: Sequence[Effect]) -> list[Effect]:
+    """Correct final masks' differences of `TESTED`, all against one base, for their number."""
+    family = iter(holm([effect.rates[TESTED] for effect in effects if effect.final]))
     return [
-        replace(each, rates={**each.rates, TESTED: next(family)}) if each.final else each
-        for each in effects
+        replace(effect, rates={**effect.rates, TESTED: next(family)}) if effect.final else effect
+        for effect in effects
     ]
 
 
@@ -119,37 +112,107 @@ CLAIMS: Final[Mapping[str, tuple[str, Name, Name]]] = {
 }
 """By the key in ``summary.json``: the rate that is lower for the first mask than for the second.
 
-Section 5 claims so of the filter, section 4.3 of the SVM, section 4.4 of the post-processing."""
+Section 5 claims it for the filter, section 4.3 for the SVM, section 4.4 for the post-processing."""
 
 
 def evidence(windows: pd.DataFrame, size: int) -> dict[str, dict[str, int]]:
-    """Count the windows that bear out each claim whose masks the drive has; equal rates do not.
+    """Count the windows that confirm each claim whose masks the drive has; equal rates do not.
 
-    By claim: how many full ``windows``, of ``size`` frames in both masks, have both rates, and in
-    how many it ``held``; ``short`` and ``short_held`` are of windows with fewer frames.
+    Returned are by claim the number of full ``windows``, of ``size`` frames in both masks, that
+    have both rates, and the number in which it ``held``; ``short`` and ``short_held`` count windows
+    with fewer frames.
     """
-    counted = {}
+    evidence_by_claim = {}
     masks = set(masks_of(windows))
     for name, (rate, better, worse) in CLAIMS.items():
         if not {better, worse} <= masks:
             continue
         base, new = (only(windows, variant=mask[0], stage=mask[1]) for mask in (worse, better))
-        pairs = paired(base, new, [*KEY, "window"])
+        pairs = pair_rows(base, new, [*KEY, "window"])
         difference = pairs[rate] - pairs[f"{rate}_base"]
         full = pairs[["frames", "frames_base"]].min(axis=1) == size
-        held, known = difference < 0, difference.notna()
-        counts = {"held": full & held, "windows": full & known}
-        counts |= {"short_held": ~full & held, "short": ~full & known}
-        counted[name] = {key: int(chosen.sum()) for key, chosen in counts.items()}
-    return counted
+        held, defined = difference < 0, difference.notna()
+        counts = {"held": full & held, "windows": full & defined}
+        counts |= {"short_held": ~full & held, "short": ~full & defined}
+        evidence_by_claim[name] = {key: int(rows.sum()) for key, rows in counts.items()}
+    return evidence_by_claim
+
+
+class CountedRows:
+    """Counts of masks, added frame by frame: 24 bytes a mask and frame, until they are a table."""
+
+    def __init__(self, *names: str) -> None:
+        self._names: Final = names
+        """Columns of names, such as variant and stage."""
+        self._rows: Final = array("I")
+        """Place of the frame, place of its names, and the four counts, again and again."""
+        self._places: Final[dict[tuple[str, ...], int]] = {}
+
+    def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], Counts]]) -> None:
+        """Add the counts of the evaluated frame at a place, by their names."""
+        for names, four in counts:
+            row = self._places.setdefault(names, len(self._places))
+            self._rows.extend((place, row, *four))
+
+    def table(self, when: pd.DataFrame, orders: Mapping[str, Sequence[str]]) -> pd.DataFrame:
+        """Return the rows with their rates, in the order in which they were added.
+
+        ``when`` has a row for each frame at its place; ``orders`` have by column the order of its
+        names, by default the order in which they first occur.
+        """
+        import pandas as pd
+
+        rows = np.array(self._rows, np.int64).reshape(-1, 6)
+        table = when.iloc[rows[:, 0]].reset_index(drop=True)
+        columns = [*zip(*self._places, strict=True)] or [()] * len(self._names)
+        for name, words in zip(self._names, columns, strict=True):
+            order = orders.get(name) or [*dict.fromkeys(words)]
+            codes = np.array([order.index(word) for word in words], np.int64)[rows[:, 1]]
+            table[name] = pd.Categorical.from_codes(codes, pd.Index([*order]))
+        table[[*OUTCOMES]] = rows[:, 2:]
+        table["N"] = rows[:, 2:].sum(axis=1)
+        return table.join(rates_of(table, METRICS))
+
+
+def episodes(stamps: Sums, errors: Floats, limit: float) -> dict[str, Any]:
+    """Return how long a drive's ERR was at or above a limit, and how soon it recovered.
+
+    ``stamps`` are ``(n,)`` nanoseconds of evaluated frames, ``errors`` their ERR; NaN is left out.
+    An episode lasts from its first frame to the first one below the limit, and has ``recovered``
+    there. If the drive's end comes before, or a gap of more than a second and three usual steps, it
+    has not recovered, and lasts to its last frame. Times are in seconds, without gaps; ``share`` is
+    the share of the drive, ``recovery`` the median time of the episodes that recovered.
+    """
+    defined = np.flatnonzero(~np.isnan(errors))
+    defined = defined[np.argsort(stamps[defined], kind="stable")]
+    steps = np.diff(stamps[defined])
+    gap = max(1_000_000_000, 3 * np.median(steps)) if len(steps) else 0
+    lasting, times, recovered = False, [0.0] * 0, [0.0] * 0
+    for error, step in zip_longest(errors[defined].tolist(), steps.tolist(), fillvalue=math.inf):
+        if error >= limit and not lasting:
+            times.append(0)
+        elif error < limit and lasting:
+            recovered.append(times[-1])
+        lasting = error >= limit and step <= gap
+        if lasting:
+            times[-1] += step
+    return {
+        "limit": limit,
+        "episodes": len(times),
+        "recovered": len(recovered),
+        "seconds": sum(times) / 1e9,
+        "share": sum(times) / (int(steps[steps <= gap].sum()) or math.nan),
+        "longest": max(times, default=0) / 1e9,
+        "recovery": float(np.median(recovered)) / 1e9 if recovered else None,
+    }
 
 
 class Scoreboard:
     """Scores frames against their truth and sums up the drive.
 
-    ``key`` are the drive and the camera; ``variants`` the names of all, in the order of the tables;
-    ``prior`` is the ``blind`` baseline, or None where no frame with truth was trained on;
-    ``ground`` is what is before the camera, where that is known.
+    ``key`` are the drive and the camera; ``variants`` are all names, in the order of the tables;
+    ``prior`` is the ``blind`` baseline, or None if no frame with truth was trained on; ``ground``
+    is what lies before the camera, if it is known.
     """
 
     def __init__(
@@ -176,7 +239,7 @@ class Scoreboard:
         self._counts = CountedRows("variant", "stage")
         self._oracles = CountedRows("variant", "oracle", "stage")
         self.heat = defaultdict[str, HeatMap](HeatMap)
-        """Where each variant's final mask errs."""
+        """The places where each variant's final mask errs."""
         self.changes = defaultdict[Transition, Change](Change)
         """Every change between masks."""
         self.curves = Curves()
@@ -189,7 +252,7 @@ class Scoreboard:
         self._seconds = defaultdict[Name, list[float]](lambda: [0.0, 0])
 
     def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
-        """Score one frame; changes nothing, so any thread may call it at any time."""
+        """Score one frame; this changes nothing, so any thread may call it at any time."""
         settings, prior = self._settings, self._prior
         return score_frame(frame, role, variants, settings, prior, ground=self._ground)
 
@@ -238,7 +301,7 @@ class Scoreboard:
         return {str(role): count for role, count in self._roles.items()}
 
     def metres(self) -> Iterator[dict[str, Any]]:
-        """Yield the rows of ``metres``; none where the camera is not known."""
+        """Yield the rows of ``metres``; none if the camera is not known."""
         return self._metres.totals(self._above)
 
     def frames(self) -> pd.DataFrame:
@@ -254,10 +317,9 @@ class Scoreboard:
         return pd.DataFrame({**key, "frame": when[:, 0], "stamp_ns": when[:, 1]})
 
     def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
-        """Return the evaluated frames' ERR at the threshold that the training frames choose.
+        """Return the evaluated frames' ERR at the threshold that is best on the training frames.
 
-        It is the threshold of a method that learnt nothing; for one that learnt from these frames
-        it says little. See `Curves.at_best_of`.
+        That tells little about a method that learnt from these frames. See `Curves.at_best_of`.
         """
         return self.curves.at_best_of(self._training)
 
@@ -266,14 +328,14 @@ class Scoreboard:
         settings, frames = self._settings, self.frames()
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
         curves, beyond = self.curves.totals(), self._edges.totals()
-        for (variant,), rows in tables.grouped(tables.finals(frames), ["variant"]):
+        for (variant,), rows in tables.group_rows(tables.finals(frames), ["variant"]):
             stamps, errors = (rows[name].to_numpy() for name in ("stamp_ns", TESTED))
             beyond[variant]["episodes"] = episodes(stamps, errors, DEGRADED_ERR)
         oracles = self._oracles.table(self._frames_added(), {})
         replaced: dict[str, dict[str, Any]] = {}
-        for (oracle,), rows in tables.grouped(oracles, ["oracle"]):
-            for variant, own in tables.as_trees(tables.totals(rows)).items():
-                replaced.setdefault(variant, {})[oracle] = own
+        for (oracle,), rows in tables.group_rows(oracles, ["oracle"]):
+            for variant, stages in tables.as_trees(tables.totals(rows)).items():
+                replaced.setdefault(variant, {})[oracle] = stages
         windows = tables.windows(frames, settings.window)
         parts = {
             "totals": tables.as_trees(tables.totals(frames)),

@@ -1,11 +1,10 @@
-"""What every threshold on a probability of road would give, from counts of pixels by its code.
+"""The rates at every threshold on the probability of road, from counts of pixels by its code.
 
 A stage that says how probable road is (`roadeval.data.Output.probability`) is one method for each
-threshold: road is what has at least that. All labelled pixels of a drive count alike, as in
-KITTI's road benchmark [1]_. Two integers a code are kept, so memory does not grow with the drive,
-and the order of the frames makes no difference.
-
-Beside them: heat maps of errors, and the pixels that one mask repairs or spoils against another.
+threshold: road are the pixels with at least that probability. All labelled pixels of a drive count
+alike, as in KITTI's road benchmark [1]_. Two integers are kept for each code, so memory does not
+grow with the drive, and the order of the frames makes no difference. Beside them are heat maps of
+errors.
 
 References
 ----------
@@ -19,8 +18,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise, permutations
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -28,27 +26,21 @@ import numpy as np
 from roadeval.data import (
     CERTAIN,
     CODES,
-    Change,
     Histogram,
-    Transition,
-    TruthBits,
     as_tree,
     best_code,
-    everywhere,
-    ones,
     wrong_above,
 )
-from roadeval.data.arrays import FN, FP, IGNORED, Bits, Floats, Plane, Sums
+from roadeval.data.arrays import FN, FP, IGNORED, Floats, Plane, Sums
 from roadeval.data.result import Cells
-from roadeval.evaluation.score.counts import Name, flat
-from roadeval.kernels import KERNELS
+from roadeval.evaluation.score.counts import Name
 
 LEVELS: Final = 256
-"""Levels of the table: each holds as many codes as it."""
+"""Levels of the table ``probabilities``; each holds 256 codes."""
 
 
 def at_levels(counts: Sums) -> Sums:
-    """Return ``(2, 65536)`` counts summed up in levels of 256 codes, ``(2, 256)``."""
+    """Sum up ``(2, 65536)`` counts in levels of 256 codes, ``(2, 256)``."""
     levels: Sums = counts.reshape(2, LEVELS, -1).sum(axis=2)
     return levels
 
@@ -57,7 +49,7 @@ class Thresholds(NamedTuple):
     """The outcomes at each threshold, from the highest to the lowest that occurs."""
 
     codes: Sums
-    """``(n,)`` int64: road is what has at least this code, or is at least of this level."""
+    """``(n,)`` int64: road are the pixels of at least this code, or level."""
     tp: Sums
     fp: Sums
     """``(n,)`` int64: road and non-road pixels that are called road."""
@@ -67,11 +59,11 @@ class Thresholds(NamedTuple):
 
     @classmethod
     def of(cls, counts: Cells) -> Thresholds:
-        """Return the thresholds of ``(2, n)`` counts of non-road and road by code or level."""
-        found = np.flatnonzero(counts.any(axis=0))[::-1]
-        fp, tp = counts[:, found].astype(np.int64).cumsum(axis=1)
+        """Return the thresholds from ``(2, n)`` counts of non-road and road by code or level."""
+        codes = np.flatnonzero(counts.any(axis=0))[::-1]
+        fp, tp = counts[:, codes].astype(np.int64).cumsum(axis=1)
         other, road = counts.sum(axis=1, dtype=np.int64).tolist()
-        return cls(found, tp, fp, road, other)
+        return cls(codes, tp, fp, road, other)
 
     @property
     def precision(self) -> Floats:
@@ -87,8 +79,8 @@ class Thresholds(NamedTuple):
     def average_precision(self) -> float:
         """AP, ``sum (R_k - R_(k-1)) P_k`` over falling thresholds; NaN without road.
 
-        Without interpolation, as scikit-learn's ``average_precision_score``; KITTI's and Pascal
-        VOC's interpolate precision and come out a little higher.
+        It is computed without interpolation, as in scikit-learn's ``average_precision_score``;
+        KITTI and Pascal VOC interpolate precision and get slightly higher values.
         """
         steps = np.diff(self.recall, prepend=0.0)
         return float((steps * self.precision).sum()) if self.road else math.nan
@@ -96,8 +88,8 @@ class Thresholds(NamedTuple):
     def max_f(self) -> dict[str, float | None]:
         """Return MaxF, the greatest ``F = 2 TP / (2 TP + FP + FN)`` over thresholds, F1 in [1]_.
 
-        With it the ``threshold`` as a fraction, of equal ones the highest, and the ``precision``
-        and ``recall`` there; all None without road.
+        Beside it are the ``threshold`` as a fraction, the highest of equal ones, and the
+        ``precision`` and ``recall`` there; all are None without road.
         """
         names = "MaxF", "threshold", "precision", "recall"
         if not self.road:
@@ -109,21 +101,21 @@ class Thresholds(NamedTuple):
 
 
 def calibration(counts: Sums) -> dict[str, float]:
-    """Return how far probabilities are what they say, from ``(2, 65536)`` counts by code.
+    """Return how well probabilities are calibrated, from ``(2, 65536)`` counts by code.
 
     ``ECE`` is the expected calibration error ``sum_b n_b / n |r_b - p_b|`` over 256 levels of equal
     width: ``n_b`` pixels of a level, the share ``r_b`` of road among them, and ``p_b`` the mean of
     their probabilities [2]_. ``confidence`` is the mean of ``max(p, 1 - p)``, and ``right`` the
-    share of pixels that are right where road is what is more probable than one half.
+    share of pixels that are right at a threshold of one half.
     """
     pixels, p = counts.sum(axis=0), np.arange(CODES) / CERTAIN
-    road, stated = (own.reshape(LEVELS, -1).sum(axis=1) for own in (counts[1], pixels * p))
-    found = {
+    road, stated = (codes.reshape(LEVELS, -1).sum(axis=1) for codes in (counts[1], pixels * p))
+    sums = {
         "ECE": np.abs(road - stated).sum(),
         "confidence": (pixels * np.maximum(p, 1 - p)).sum(),
         "right": pixels.sum() - wrong_above(counts)[round(CERTAIN / 2)],
     }
-    return {name: float(value / pixels.sum()) for name, value in found.items()}
+    return {name: float(value / pixels.sum()) for name, value in sums.items()}
 
 
 class Curves:
@@ -131,20 +123,20 @@ class Curves:
 
     def __init__(self) -> None:
         self.counts: dict[Name, Sums] = {}
-        """``(2, 65536)`` int64 each, or of the ground ``(2, 256)``: non-road and road."""
+        """Pixels of non-road and road, ``(2, 65536)`` int64, or cells of ground, ``(2, 256)``."""
         self._frames: Counter[Name] = Counter()
 
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
-        """Return ERR of all pixels at the threshold that errs least on other frames.
+        """Return ERR of all pixels at the threshold that is best on other frames.
 
-        By variant and stage of both: the ``threshold`` as a fraction, and ``ERR``.
+        Returned are by variant and stage the ``threshold`` as a fraction, and ``ERR``.
         """
-        found = {}
+        rates = {}
         for name in (name for name in self.counts if name in others.counts):
             code, counts = best_code(others.counts[name]), self.counts[name]
             err = float(wrong_above(counts)[code] / counts.sum())
-            found[name] = {"threshold": code / (CODES - 1), "ERR": err}
-        return as_tree(found.items())
+            rates[name] = {"threshold": code / (CODES - 1), "ERR": err}
+        return as_tree(rates.items())
 
     def add(self, histograms: Mapping[Name, Histogram]) -> None:
         """Add the histograms of a frame."""
@@ -153,29 +145,29 @@ class Curves:
             self.counts[name] = self.counts.get(name, 0) + counts.astype(np.int64)
 
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Return by variant and stage what is quoted of curves, fit for JSON.
+        """Return the key figures of each curve by variant and stage, fit for JSON.
 
-        The ``frames``, ``AP``, and what `Thresholds.max_f` and `calibration` find.
+        They are ``frames``, ``AP``, and the values of `Thresholds.max_f` and `calibration`.
         """
-        found = {}
+        figures = {}
         for name, counts in self.counts.items():
-            own, frames = Thresholds.of(counts), self._frames[name]
-            area = {"frames": frames, "AP": own.average_precision}
-            found[name] = {**area, **own.max_f(), **calibration(counts)}
-        return as_tree(found.items())
+            thresholds, frames = Thresholds.of(counts), self._frames[name]
+            area = {"frames": frames, "AP": thresholds.average_precision}
+            figures[name] = {**area, **thresholds.max_f(), **calibration(counts)}
+        return as_tree(figures.items())
 
 
 CELLS: Final = 160
 """Cells across the longer side of a heat map, at most."""
 PENDING: Final = 255
-"""Frames whose sum fits in a byte: adding bytes is ten times as fast as adding integers."""
+"""Number of frames whose sum fits in a byte: bytes are added ten times as fast as integers."""
 
 
 class HeatMap:
-    """How often each pixel was labelled, and was a false positive or a false negative.
+    """Counts of how often each pixel was labelled, a false positive and a false negative.
 
-    Summed up in square cells, no more than `CELLS` across the longer side: a sum a pixel would be
-    a large part of a run's memory. Frames of another size than the first are left out.
+    They are summed up in square cells, `CELLS` across the longer side at most: a sum for each pixel
+    would take a large part of a run's memory. Frames of another size than the first are left out.
     """
 
     def __init__(self) -> None:
@@ -208,36 +200,10 @@ class HeatMap:
         return self._side, self._sums.copy()
 
     def _carry(self) -> None:
-        # A row of cells at a time: sums of a whole frame would be eight times as large as it.
+        # One row of cells at a time: sums of a whole frame would take eight times its memory.
         columns = np.arange(0, self._bytes.shape[2], self._side)
         for row in range(self._sums.shape[1]):
             band = self._bytes[:, row * self._side : (row + 1) * self._side]
             sums = band.sum(axis=1, dtype=np.int64)
             self._sums[:, row] += np.add.reduceat(sums, columns, axis=1)
         self._bytes[:] = 0
-
-
-def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Transition, Change]:
-    """Count what each stage changed in the mask before it, and each final mask in the others.
-
-    ``names`` are variant and stage of each mask, a variant's in the order they ran; ``masks`` are
-    ``(K, H, words)``. Ignored pixels are in no count.
-    """
-    labelled = truth.labelled
-    whole = ones(labelled)
-    wrong = flat((masks ^ truth.road) & labelled)
-    both = KERNELS.count_bits(wrong, wrong, flat([everywhere(truth.shape)]))[..., 0].tolist()
-    found = {}
-    for before, after in _steps(names):
-        repaired, spoiled = (both[each][each] - both[before][after] for each in (before, after))
-        found[*names[before], *names[after]] = Change(repaired, spoiled, whole)
-    return found
-
-
-def _steps(names: Sequence[Name]) -> Iterator[tuple[int, int]]:
-    """Yield the places of a mask before and after: stage to stage, and final to final."""
-    for before, after in pairwise(range(len(names))):
-        if names[before][0] == names[after][0]:
-            yield before, after
-    last = {variant: place for place, (variant, _) in enumerate(names)}
-    yield from permutations(last.values(), 2)

@@ -1,7 +1,7 @@
 """Frames without truth: which to look at, and how far masks differ. None of it is an error rate.
 
-With the truth of CamVid held back, entropy found 9 and 6 of the ten worst frames in 20, where
-chance finds 2.2; as a level it said 1.2 % of masks that were 3.2 % wrong.
+On CamVid, without its truth, the 20 frames with the highest entropy included 9 and 6 of the ten
+worst; chance finds 2.2. As an error rate it would have been 1.2 % for masks that were 3.2 % wrong.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ SIGNS: Final[Mapping[str, str]] = {
     "disagreement": "share of pixels on which another variant differs, mean over the others",
     "flicker": "share of pixels that change from the frame before",
 }
-"""The signs of doubt, with their meanings; frames are ranked by the first that a variant has."""
+"""Signs of doubt with their meanings; frames are ranked by the first one that a variant has."""
 _STEP: Final = 4
-"""Every so many rows and columns are looked at; frames rank as with every pixel (r > 0.998)."""
+"""Rows and columns from one pixel to the next; frames rank as with all pixels (r > 0.998)."""
 
 
 @cache
@@ -46,7 +46,7 @@ def _entropies() -> Values:
 def entropy(probability: Probability) -> float:
     """Return the mean entropy of ``(H, W)`` uint16 codes of a probability, from 0 to 1 bit.
 
-    The mean is over every 16th pixel: one of `_STEP` rows and columns.
+    The mean is over every 16th pixel: one in `_STEP` rows and columns.
     """
     return float(_entropies()[probability[::_STEP, ::_STEP]].mean())
 
@@ -57,18 +57,16 @@ def doubts_of(variants: Sequence[VariantResult]) -> tuple[Doubt, ...]:
     differ: defaultdict[str, dict[str, float]] = defaultdict(dict)
     for one, other in combinations(finals, 2):
         differ[one][other] = differ[other][one] = _share(finals[one][1], finals[other][1])
-    found = []
-    for variant in variants:
-        said = [each.output.probability for each in variant.stages]
-        codes = next((each for each in reversed(said) if each is not None), None)
-        unsure = math.nan if codes is None else entropy(codes)
-        name = variant.variant
-        found.append(Doubt(name, finals[name][0], unsure, differ[name]))
-    return tuple(found)
+    doubts = []
+    for name, stages in ((variant.variant, variant.stages) for variant in variants):
+        codes = [s.output.probability for s in stages if s.output.probability is not None]
+        unsure = entropy(codes[-1]) if codes else math.nan
+        doubts.append(Doubt(name, finals[name][0], unsure, differ[name]))
+    return tuple(doubts)
 
 
 def _share(one: Packed, other: Packed) -> float:
-    """Return the share of pixels on which two masks differ; NaN where their sizes do."""
+    """Return the share of pixels on which two masks differ; NaN if their sizes differ."""
     height, width = one.shape
     return ones(one.bits ^ other.bits) / (height * width) if one.shape == other.shape else math.nan
 
@@ -79,7 +77,7 @@ class Unlabelled:
     def __init__(self) -> None:
         self._stages: dict[str, str] = {}
         self._stamps, self._signs = array("q"), array("d")
-        """Of the first variant, whose frames are ranked: numbers and stamps, and `SIGNS`."""
+        """Numbers and stamps, and `SIGNS`, of the first variant, whose frames are ranked."""
         self._differ = defaultdict[tuple[str, str], list[float]](lambda: [0.0, 0])
         self._before: Mapping[str, Packed] = {}
 
@@ -89,12 +87,11 @@ class Unlabelled:
         if result.doubts:
             now = {v.variant: mask for v in result.variants for _, mask in v.masks()}
         self._before = now
-        found = []
-        for each in result.doubts:
-            name = each.variant
+        doubts = []
+        for name, still in ((doubt.variant, doubt) for doubt in result.doubts):
             changed = _share(now[name], before[name]) if name in before else math.nan
-            doubt = replace(each, flicker=changed)
-            found.append(doubt)
+            doubt = replace(still, flicker=changed)
+            doubts.append(doubt)
             self._stages[name] = doubt.stage
             if name == next(iter(self._stages)):
                 self._stamps.extend((result.frame.number, result.frame.stamp_ns))
@@ -103,7 +100,7 @@ class Unlabelled:
                 pair = self._differ[name, other]
                 pair[0] += share
                 pair[1] += 1
-        return tuple(found)
+        return tuple(doubts)
 
     def interrupt(self) -> None:
         """Note that the next frame does not follow the one before."""
@@ -120,7 +117,7 @@ class Unlabelled:
         return table
 
     def differing(self) -> dict[tuple[str, str], float]:
-        """Return the mean share of pixels on which two variants differ, by pair, once each."""
+        """Return for each pair of variants the mean share of pixels on which they differ."""
         return {
             pair: self._differ[pair][0] / self._differ[pair][1]
             for pair in combinations(self._stages, 2)
@@ -129,11 +126,11 @@ class Unlabelled:
 
 
 def sign_of(rows: pd.DataFrame) -> str | None:
-    """Return by which of `SIGNS` a variant's rows are ranked; None where it has none."""
+    """Return the one of `SIGNS` by which a variant's rows are ranked; None if it has none."""
     return next((sign for sign in SIGNS if rows[sign].notna().any()), None)
 
 
-def chosen(
+def choose_frames(
     stamps: Sums,
     scores: Floats,
     count: int,
@@ -144,32 +141,32 @@ def chosen(
 ) -> tuple[Sums, Sums]:
     """Choose frames to label: half of them at random, half by rank.
 
-    The random ones are the next in `draw_order`; one that is ``taken``, because an earlier rank has
-    put it there, needs no further label. The ranked ones have the highest score and are apart from
-    all others, as far as there are so many.
+    The random ones are the next in `draw_order`; one that is ``taken``, because it was chosen by
+    rank before, needs no further label. The ranked ones have the highest scores and are apart from
+    all others, if there are enough.
 
     Parameters
     ----------
     stamps, scores
-        ``(n,)`` of all frames; nanoseconds, and how much each is in doubt, NaN where unknown.
+        ``(n,)`` of all frames: nanoseconds, and how much each is in doubt, NaN if unknown.
     drawn, taken
-        How many of the order were drawn before, and the places of all frames that have a label.
+        Number of frames that were drawn before, and the places of all frames that have a label.
 
     Returns
     -------
     tuple
         The places of the random ones, and of the ranked ones.
     """
-    known = np.flatnonzero(np.isfinite(scores))
-    half = -(-count // 2) if len(known) else count
+    scored = np.flatnonzero(np.isfinite(scores))
+    half = -(-count // 2) if len(scored) else count
     random = draw_order(len(stamps), seed)[drawn : drawn + half]
     without = [*{*taken, *random.tolist()}]
-    wanted = max(count - len({*random.tolist()} - {*taken}), 0)
-    ranked = known[np.argsort(-scores[known], kind="stable")]
+    missing = max(count - len({*random.tolist()} - {*taken}), 0)
+    ranked = scored[np.argsort(-scores[scored], kind="stable")]
     ranked = ranked[~np.isin(ranked, without)]
     apart = near_ns(stamps)
     while True:
-        found = separate(stamps, ranked, wanted, apart, stamps[without].tolist())
-        if len(found) == min(wanted, len(ranked)) or not apart:
-            return random, found
+        places = separate(stamps, ranked, missing, apart, stamps[without].tolist())
+        if len(places) == min(missing, len(ranked)) or not apart:
+            return random, places
         apart //= 2

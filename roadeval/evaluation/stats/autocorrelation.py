@@ -1,18 +1,19 @@
-"""The mean of a series whose neighbours resemble each other, and how far off it may lie.
+"""The mean of a series whose neighbours resemble each other, and how uncertain it is.
 
 A series is a first-order autoregression plus noise that is new on each frame. The coefficient and
 the noise's share of the variance are unknown: a grid of both is tried, and each model is weighted
-by how well it explains the slowest cosine coefficients of the series [1]_, which do not hold the
-mean. Given a model the mean is Student's; together it is a mixture. What is returned is Student's,
-too: its precision is the models' on average, and its degrees give the 95 % interval of the mixture.
-Farther out the mixture is led by unlikely models with huge errors, which would hide any finding.
-Skewed series bend the distribution [2]_: a drive that met few bursts has a mean that is too low
-*and* a spread that is too small.
+by how well it explains the slowest cosine coefficients of the series [1]_, which do not contain the
+mean. Given a model, the mean has Student's distribution; over all models it has a mixture of them.
+The result is a Student's distribution again: its precision is the average of the models', and its
+degrees of freedom are chosen for the 95 % interval of the mixture. Farther out the mixture is
+dominated by unlikely models with huge errors, which would hide any finding. Skewed series bend the
+distribution [2]_: a drive that met few bursts has a mean that is too low *and* a spread that is too
+small.
 
-How often the intervals hold, beside those of textbooks, is in ``benchmarks/INTERVALS.md``. Drift
-that noise hides on a short drive, or that takes longer than the drive, and bursts that a drive
-hardly met are not allowed for: there three or four of five hold rather than nineteen of twenty, and
-p-values are too small.
+``benchmarks/INTERVALS.md`` shows how often the intervals hold, beside those of textbooks. They do
+not allow for drift that noise hides on a short drive, for drift that takes longer than the drive,
+and for bursts that a drive hardly met: there three or four of five hold rather than nineteen of
+twenty, and p-values are too small.
 
 References
 ----------
@@ -37,7 +38,7 @@ _TAIL: Final = 0.025
 
 
 class MeanDistribution(NamedTuple):
-    """Student's distribution of a mean, skewed: what it may be, given a series that was seen.
+    """Student's distribution of a mean, skewed, given a series.
 
     An interval holds the values whose p-value is at least one minus the confidence.
     """
@@ -49,7 +50,7 @@ class MeanDistribution(NamedTuple):
     effective: float
     """Independent values that would determine the mean as well."""
     skewness: float = 0.0
-    """Of the mean."""
+    """Skewness of the mean."""
 
     def p_value(self, value: float = 0.0) -> float:
         """Return the two-sided p-value of the hypothesis that the mean is ``value``."""
@@ -75,7 +76,7 @@ class MeanDistribution(NamedTuple):
 def mean_distribution(series: Floats, *, independent: bool = False) -> MeanDistribution:
     """Estimate the mean of a stationary process from a stretch of it, ``(n,)``, n at least 4.
 
-    Values that are independent by design give Student's distribution as it is in textbooks.
+    For values that are ``independent`` by design it is Student's distribution of textbooks.
     """
     from scipy.fft import dct
     from scipy.special import beta, stdtr, stdtridf, stdtrit
@@ -93,8 +94,8 @@ def mean_distribution(series: Floats, *, independent: bool = False) -> MeanDistr
     weights /= weights.sum()
     errors = np.sqrt(of_mean * variances)
     error = float(weights @ errors**-2) ** -0.5
-    # The mixture's interval, by Newton's method: tails are convex, so that from Student's interval,
-    # which is narrower, no step is too long.
+    # The mixture's interval, by Newton's method. It starts from Student's interval, which is
+    # narrower; tails are convex, so no step is too long.
     norm = math.sqrt(count) * beta(0.5, count / 2)
     half, step = float(stdtrit(count, 1 - _TAIL)) * error, math.inf
     while step > 1e-13 * half:
@@ -106,23 +107,23 @@ def mean_distribution(series: Floats, *, independent: bool = False) -> MeanDistr
     effective = min(float(series.var()) / error**2, n)
     centred = series - mean
     skewness = float((centred**3).mean() / (centred**2).mean() ** 1.5)
-    # As far as it exceeds its own error, whose square is that of independent normal values.
+    # Only as far as it exceeds its standard error, which is that of independent normal values.
     skewness = skewness**3 / (skewness**2 + 6 / effective) / math.sqrt(effective)
     return MeanDistribution(mean, error, degrees, effective, skewness)
 
 
 @lru_cache(maxsize=8)
 def _models(n: int) -> tuple[Floats, Floats, Floats]:
-    """Return what the ``g`` models of the grid expect of series of length ``n``.
+    """Return the properties of the ``g`` models of the grid, for series of length ``n``.
 
-    ``(g, m)``: one over the variances of the cosine coefficients, in the series' variance.
-    ``(g,)``: the logarithm of the weight before any series is seen, times the factor of the
-    likelihood that depends on the model alone. ``(g,)``: the variance of the mean.
+    They are the inverse variances of the cosine coefficients, in units of the series' variance,
+    ``(g, m)``; the logarithm of each model's prior weight times the factor of the likelihood that
+    depends on the model only, ``(g,)``; and the variance of the mean, ``(g,)``.
     """
-    # Coefficients from 0 to a memory of ten lengths, the closer together the nearer to 1, where
-    # they matter most. All are as likely: their weights are in proportion to their distance from 1.
+    # Coefficients from 0 to a memory of ten lengths, closer together near 1, where they matter
+    # most. All are equally likely: their weights are proportional to their distance from 1.
     distance = (10.0 * n) ** -np.linspace(0, 1, 48)
-    # The autoregression's shares of the variance: all and less are as likely, as is any share less.
+    # The autoregression's shares of the variance: the whole is as likely as all others together.
     shares, likely = np.array([(1, 0.5), (0.95, 0.06), (0.75, 0.12), (0.5, 0.12), (0.25, 0.2)]).T
     count = min(max(90, round(2.5 * math.sqrt(n))), n - 1)
     slow = cosine_variances(1 - distance, count + 1, n)
@@ -134,9 +135,9 @@ def _models(n: int) -> tuple[Floats, Floats, Floats]:
 def cosine_variances(coefficients: Floats, count: int, n: int) -> Floats:
     """Compute variances of the slowest orthonormal cosine coefficients (DCT-II), ``(g, count)``.
 
-    They are exact for stationary autoregressions of variance 1 and length ``n``: the spectrum, less
-    what the two ends cut off. ``coefficients`` are ``(g,)``, at least 0 and below 1. The first
-    variance, over ``n``, is that of the mean.
+    They are exact for stationary autoregressions of variance 1 and length ``n``: the spectrum minus
+    the effect of the two ends. ``coefficients`` are ``(g,)``, at least 0 and below 1. The first
+    variance divided by ``n`` is the variance of the mean.
     """
     r, numbers = coefficients[:, None], np.arange(count)
     angle = np.pi * numbers / n

@@ -2,8 +2,8 @@
 
 The masks are of the same frames, so their rates are subtracted frame by frame. Neighbouring frames
 of a drive resemble each other: `mean_distribution` tells how far off their mean may be. Drives are
-independent: below 30 groups of them interval and p-value are those of the exact sign-flip test,
-from there on Student's. An interval leaves out 0 exactly where p is below one minus the confidence.
+independent: interval and p-value are those of the exact sign-flip test below 30 groups of drives,
+and Student's from 30 on. An interval excludes 0 exactly if p is below one minus the confidence.
 
 The sign-flip test needs no normal distribution, nor drives that vary alike. From ten groups on it
 holds as often as Student's; with six its interval reaches from the least to the greatest mean,
@@ -22,13 +22,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from pydantic import BeforeValidator
 
 from roadeval.data.arrays import Floats, Sums
 from roadeval.data.words import counted
+from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
 
@@ -49,35 +50,35 @@ class Difference:
     """NaN if no unit has a difference; null where it is read from JSON."""
     low: float | None
     high: float | None
-    """The interval; within a drive not beyond what the base's rate leaves room for. None together
-    with `p`."""
+    """The interval; within a drive it stays within what the base's rate leaves room for. None
+    together with `p`."""
     p: float | None
     """Two-sided p-value of no difference."""
     confidence: float
     unit: Literal["frames", "drives"]
     """Whether the mean is over the frames of one drive, or over the means of drives."""
     units: int
-    """How many have a difference."""
+    """Number of frames or drives that have a difference."""
     effective: float | None = None
     """Independent frames that would determine the mean as well; None without an interval, and over
     drives."""
     standard_error: float | None = None
-    """Of the mean; None where `effective` is."""
+    """The mean's standard error; None if `effective` is."""
     degrees: float | None = None
     """Degrees of freedom: the interval is ``mean ± t(degrees) standard_error``, and the p-value
     that of ``mean / standard_error``, but for skewness and the room that the base leaves."""
     groups: int | None = None
-    """Over drives: groups of drives, each of which counts as one."""
+    """Number of groups of drives, each of which counts as one; None within a drive."""
     worse: int | None = None
     better: int | None = None
     equal: int | None = None
-    """How many units are worse than the base, better, and exactly the same."""
+    """Number of units that are worse than the base, better, and exactly the same."""
     needed: int | None = None
-    """Units, or groups, that an interval needs; None where there is one."""
+    """Units, or groups, that an interval needs; None if there is one."""
     p_holm: float | None = None
-    """The p-value after Holm's correction; None where none was applied, see `holm`."""
+    """The p-value after Holm's correction; None if none was applied, see `holm`."""
     comparisons: int | None = None
-    """How many differences were corrected for."""
+    """Number of differences that were corrected for."""
 
     @property
     def is_zero(self) -> bool:
@@ -86,7 +87,7 @@ class Difference:
 
     @property
     def none_because(self) -> str:
-        """Why there is no interval, as a clause; empty where there is one.
+        """The reason why there is no interval, as a clause; empty if there is one.
 
         >>> Difference(0.1, None, None, None, 0.95, "drives", 1, groups=1, needed=6).none_because
         '1 drive is too few for an interval (6 are needed)'
@@ -113,8 +114,8 @@ def interval(
     """Average ``(n,)`` paired differences, with an interval and the two-sided p-value of 0.
 
     They are of a drive's frames in their order, or of drives; NaN is left out. ``averaged`` are the
-    values whose mean it is, where these are others: moments that several cameras saw, or groups of
-    drives. An interval needs the ``least`` frames; `LEAST_GROUPS`, and more for more confidence.
+    values to average instead: moments that several cameras saw, or groups of drives. An interval
+    needs ``least`` frames, or `LEAST_GROUPS` groups, and more for more confidence.
     """
     defined = differences[~np.isnan(differences)]
     values = defined if averaged is None else averaged
@@ -152,63 +153,51 @@ def interval(
     )
 
 
-class CameraRates(NamedTuple):
-    """The rates of two masks on the same frames of a camera, in its order.
+def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
+    """Average the differences of a rate over a drive's frames, with an interval.
 
-    NaN where a rate is undefined, which leaves the frame out.
+    ``pairs`` are as of `roadeval.evaluation.tables.pair_rows`, with columns ``camera``,
+    ``stamp_ns``, the rate, and the base's rate with ``_base`` behind its name. Frames without a
+    difference are left out. The mean of several cameras is the mean of their means. Frames that
+    they took at the same time are no further evidence: a camera that is there twice changes
+    nothing, see `at_moments`.
     """
-
-    stamps: Sums
-    """``(n,)`` nanoseconds."""
-    rates: Floats
-    base: Floats
-    """``(n,)`` each."""
-
-
-def within_drive(
-    cameras: Sequence[CameraRates], settings: EvaluationSettings, *, higher_is_better: bool = False
-) -> Difference:
-    """Average paired differences of a drive's frames, ``rates - base``, with an interval.
-
-    The mean of several cameras is that of their means. Frames that they took at the same time are
-    no further evidence: a camera that is there twice changes nothing, see `at_moments`.
-    """
-    defined = []
-    for stamps, rates, base in cameras:
-        both = ~np.isnan(rates - base)
-        if both.any():
-            defined.append(CameraRates(stamps[both], rates[both], base[both]))
+    stamps, base = pairs["stamp_ns"].to_numpy(), pairs[f"{rate}_base"].to_numpy()
+    differences, camera = pairs[rate].to_numpy() - base, pairs["camera"].factorize()[0]
+    defined = ~np.isnan(differences)
+    cameras = [defined & (camera == number) for number in np.unique(camera[defined])]
+    series = [(stamps[frames], differences[frames]) for frames in cameras]
     difference = interval(
-        np.concatenate([[], *(camera.rates - camera.base for camera in defined)]),
+        differences,
         settings.confidence,
-        averaged=at_moments(defined) if len(defined) > 1 else None,
+        averaged=at_moments(series) if len(series) > 1 else None,
         least=settings.least_frames,
-        higher_is_better=higher_is_better,
+        higher_is_better=METRICS[rate].higher_is_better,
     )
     if difference.low is None or difference.high is None or not difference.standard_error:
         return difference
-    level = float(np.mean([camera.base.mean() for camera in defined]))
+    level = float(np.mean([base[frames].mean() for frames in cameras]))
     low, high = max(difference.low, -level), min(difference.high, 1 - level)
     return replace(difference, low=low, high=high)
 
 
-def at_moments(cameras: Sequence[CameraRates]) -> Floats:
-    """Return a value a moment, ``(T,)``; their mean is that of the cameras' mean differences.
+def at_moments(cameras: Sequence[tuple[Sums, Floats]]) -> Floats:
+    """Return a value for each moment, ``(T,)``, whose mean is that of the cameras' means.
 
-    It varies as that mean does: at moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)``
-    over the frames i that were taken then, each by a camera c of C, which has n_c frames. The
-    moments are the frames of the camera that has most; a frame of another belongs to the nearest.
+    ``cameras`` have stamps and differences, ``(n,)`` each. The series varies as its mean does: at
+    moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)`` over the frames i that were
+    taken then, each by a camera c of C, which has n_c frames. The moments are the frames of the
+    camera that has most; a frame of another camera belongs to the nearest.
     """
-    clock = max((camera.stamps for camera in cameras), key=len)
+    clock = max((stamps for stamps, _ in cameras), key=len)
     order, start = np.argsort(clock, kind="stable"), clock.min()
     moments = clock[order] - start
     total, sums = 0.0, np.zeros(len(clock))
-    for camera in cameras:
-        differences = camera.rates - camera.base
+    for stamps, differences in cameras:
         mean = differences.mean()
         total += mean / len(cameras)
         parts = (differences - mean) * (len(clock) / (len(cameras) * len(differences)))
-        nearest = np.searchsorted(moments[1:] + moments[:-1], 2 * (camera.stamps - start))
+        nearest = np.searchsorted(moments[1:] + moments[:-1], 2 * (stamps - start))
         np.add.at(sums, order[nearest], parts)
     return total + sums
 
@@ -220,14 +209,12 @@ def group_means(drives: pd.DataFrame) -> Floats:
     return means
 
 
-def over_drives(
-    drives: pd.DataFrame, confidence: float, *, higher_is_better: bool = False
-) -> Difference:
-    """Average the differences of drives, in any order, with an interval.
+def over_drives(drives: pd.DataFrame, confidence: float, rate: str = TESTED) -> Difference:
+    """Average the differences of a rate over drives, in any order, with an interval.
 
-    Columns are ``drive``; ``group``, a name shared with other drives, as of a day or a route, or
-    its own without one: a group's drives are averaged first, and every group counts alike; and
-    ``mean``, the mean difference on the drive, NaN if no frame has one.
+    Columns are ``drive``; ``group``, a name shared with other drives (a day or a route), else the
+    drive's own; and ``mean``, the mean difference on the drive, NaN if no frame has one. A group's
+    drives are averaged first, and every group counts alike.
 
     Examples
     --------
@@ -238,25 +225,30 @@ def over_drives(
     >>> round(difference.mean, 3), difference.low, difference.high, difference.p, difference.worse
     (0.02, -0.01, 0.05, 0.09375, 5)
     """
-    means, groups = drives["mean"].to_numpy(float), group_means(drives)
-    return interval(means, confidence, "drives", averaged=groups, higher_is_better=higher_is_better)
+    return interval(
+        drives["mean"].to_numpy(float),
+        confidence,
+        "drives",
+        averaged=group_means(drives),
+        higher_is_better=METRICS[rate].higher_is_better,
+    )
 
 
 def strata(
     drives: pd.DataFrame, tags: Sequence[str], confidence: float
 ) -> Iterator[tuple[str, str, Difference]]:
-    """Yield each tag, its values, and the difference on the drives that have the value.
+    """Yield each tag, each of its values, and the difference on the drives that have the value.
 
-    ``drives`` are as of `over_drives`, with a column a tag; a drive without a value is left out of
-    this division. A tag that does not divide the drives makes no parts. p-values are corrected
-    together.
+    ``drives`` are as of `over_drives`, with a column for each tag; a drive without a value is left
+    out of this division. A tag that does not divide the drives makes no parts. p-values are
+    corrected together.
     """
-    known = drives[drives["mean"].notna()]
+    drives = drives[drives["mean"].notna()]
     parts = {
         (tag, str(value)): rows
         for tag in tags
-        if len(known[tag].unique()) > 1
-        for value, rows in known.groupby(tag)
+        if len(drives[tag].unique()) > 1
+        for value, rows in drives.groupby(tag)
     }
     family = holm([over_drives(part, confidence) for part in parts.values()])
     yield from ((*part, difference) for part, difference in zip(parts, family, strict=True))
@@ -266,9 +258,9 @@ def sign_flip_p(values: Floats, mean: float = 0.0) -> float:
     """Compute the exact two-sided p-value of the hypothesis that the mean is ``mean``.
 
     ``p = #{s : |sum s_i (x_i - mean)| >= |sum (x_i - mean)|} / 2^n``: if the mean is right and each
-    of the ``(n,)`` values symmetric about it, all patterns of signs s are as likely. Flipping a set
-    of values leaves a sum as great exactly where the set's own is not above 0, so sets are counted,
-    as pairs of one half's and the other's [2]_; the time doubles with every second value.
+    of the ``(n,)`` values is symmetric about it, all patterns of signs s are equally likely. The
+    sum stays as great after flipping a set of values exactly if the sum of the set is not above 0.
+    So sets are counted, as pairs from both halves [2]_; the time doubles with every second value.
     `scipy.stats.permutation_test`, which tries the patterns, takes seconds and 1 GB for 20 values.
     """
     away = values - mean
@@ -291,9 +283,9 @@ def sign_flip_interval(values: Floats, confidence: float) -> tuple[float, float]
 
 
 def _lower_end(values: Floats, confidence: float) -> float:
-    """Return the least mean that is not rejected, by halves: 1e-8 of the way at most above it.
+    """Return the least mean that is not rejected, by bisection, 1e-8 of the range too high at most.
 
-    0 is tried first, so that no rounding puts an end on its other side.
+    0 is tried first, so that rounding puts no end on its wrong side.
     """
     low, high = float(values.min()), float(values.mean())
     if sign_flip_p(values, low) >= 1 - confidence:
@@ -311,7 +303,7 @@ def holm(family: Sequence[Difference]) -> list[Difference]:
 
     If no difference of the family is real, the probability that any corrected p-value is below
     ``a`` is at most ``a``, however the comparisons depend on each other [3]_. A difference without
-    a p-value is not counted, nor is one that is 0 on every unit: nothing can be found there.
+    a p-value is not counted, nor is one that is 0 on every unit.
     """
     tested = sorted(
         (difference.p, place)
@@ -328,10 +320,10 @@ def holm(family: Sequence[Difference]) -> list[Difference]:
 def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
     """Correct p-values so that few of the findings are false.
 
-    Of those whose corrected value is at most ``q``, a share of at most ``q`` is false on average:
-    ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [4]_. That holds where the tests
-    are independent, as those of different drives are, or depend on each other positively. None is
-    what was not tested: it is not counted and stays None.
+    Among the findings whose corrected value is at most ``q``, a share of at most ``q`` is false on
+    average: ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [4]_. That holds if the
+    tests are independent, as those of different drives are, or depend on each other positively.
+    None stands for what was not tested: it is not counted and stays None.
     """
     tested = sorted((p, place) for place, p in enumerate(values) if p is not None)
     corrected, least = list(values), 1.0

@@ -1,8 +1,7 @@
 """A rate of a whole drive from a few labelled frames that were drawn at random.
 
-Only chance in the drawing enters: however alike neighbours are, and whatever the frames are like,
-the interval is of the mean over exactly these frames. ``docs/how-to/pick.md`` tells how
-often it holds.
+The interval is for the mean over exactly the frames of the drive, so only chance in the drawing
+enters, however alike neighbours are. ``docs/how-to/pick.md`` tells how often it holds.
 """
 
 from __future__ import annotations
@@ -16,11 +15,11 @@ import numpy as np
 from roadeval.data.arrays import Floats, Sums
 
 REGRESSION_FROM: Final = 8
-"""So many labels it takes to learn how a rate goes with the frames' score."""
+"""Number of labels from which on the relation of a rate to the frames' scores is learnt."""
 FAR: Final = 2.0
-"""Scores that lie so many interquartile ranges above the upper quartile are those of bursts. With
-3 the interval held in 74 % of draws where the score of a burst is twice that of other frames, with
-2 in 93 % or more, and drives without bursts get hardly wider ones."""
+"""Scores so many interquartile ranges above the upper quartile belong to bursts. If a burst scores
+twice as high as other frames, the interval held in 74 % of draws with 3, in 93 % or more with 2;
+for drives without bursts it gets hardly wider."""
 
 
 @dataclass(frozen=True)
@@ -30,28 +29,28 @@ class Estimate:
     mean: float
     low: float | None
     high: float | None
-    """The ends of the interval; None where it takes more labels."""
+    """The ends of the interval; None if it takes more labels."""
     confidence: float
     labels: int
     frames: int
     """Labelled frames that were drawn, and frames in all."""
     to_halve: int | None
-    """So many further labels, drawn at random, would halve the interval; None where none can."""
+    """Further labels, drawn at random, that would halve the interval; None if none can."""
     unseen: int = 0
-    """Frames far more in doubt than all others, where none of them was drawn: the interval takes
-    in whatever their rate is."""
+    """Frames far more in doubt than all others, if none of them was drawn: the interval includes
+    any rate that they may have."""
 
     @property
     def missed(self) -> float:
-        """The greatest share of the frames that was missed altogether with a chance of 5 %."""
+        """The greatest share of the frames of which none was drawn with a chance of 5 %."""
         return float(1 - 0.05 ** (1 / self.labels))
 
 
 def draw_order(count: int, seed: int) -> Sums:
-    """Return ``count`` frames in an order of which every beginning is a stratified random sample.
+    """Return ``count`` frames in an order whose beginnings are all stratified random samples.
 
-    The first m frames lie spread along the drive, and every frame is among them with probability
-    m / count exactly, so that whoever labels more goes on in the order. They are hit by the van der
+    The first m frames are spread along the drive, and every frame is among them with probability
+    m / count exactly, so that further labels can follow the order. The order is that of the van der
     Corput sequence, scrambled as in [1]_, on a ring of frames that is turned at random.
 
     References
@@ -59,7 +58,7 @@ def draw_order(count: int, seed: int) -> Sums:
     .. [1] A. B. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995.
     """
     rng = np.random.default_rng(seed)
-    # So fine that a frame has at least 15 points of the ring.
+    # Fine enough for each frame to have at least 15 points of the ring.
     levels = max(count - 1, 1).bit_length() + 4
     cells = np.arange(2**levels)
     rank = np.zeros(2**levels, np.int64)
@@ -78,25 +77,23 @@ def estimate(
 ) -> Estimate:
     """Estimate the mean of a rate over all frames.
 
-    The drawn frames' mean is moved by how far their mean score is from that of all (a regression
-    estimator [1]_, section 7); its variance is that of the residuals, each divided by one minus its
-    leverage as the jackknife does. The draw is stratified along the drive, so the variance is taken
-    from the differences between neighbours among the drawn frames ([2]_, section 8.2, v2). The more
-    of all frames are drawn, the less even are their gaps; so the variance of a simple random sample
-    is added, times the share that is drawn. With fewer than `REGRESSION_FROM` labels the estimate
-    is the plain mean. The interval is Student's of the logarithm: error rates are skewed to the
-    right. Where errors come in rare bursts, none may be among the drawn frames, which then say
-    nothing of them: if the scores tell of such frames (`FAR`), the interval is widened by all that
-    their rate can be, 0 to 1.
+    The mean of the drawn frames is corrected for the distance of their mean score from that of all
+    frames (a regression estimator [1]_, section 7); its variance is that of the residuals, each
+    divided by one minus its leverage, as in the jackknife. The draw is stratified along the drive,
+    so the variance is computed from the differences of neighbours among the drawn frames ([2]_,
+    section 8.2, v2). Their gaps are less even if many frames are drawn, so the variance of a simple
+    random sample is added, times the share that is drawn. With fewer than `REGRESSION_FROM` labels
+    the estimate is the plain mean. The interval is Student's of the logarithm, because error rates
+    are skewed to the right. If errors come in rare bursts, none of them may have been drawn: if the
+    scores show such frames (`FAR`), the interval includes any rate that they may have, 0 to 1.
 
     Parameters
     ----------
     values
-        ``(m,)``: the rate of the labelled ones among the frames that were drawn at random, in the
-        order of the drive.
+        ``(m,)``: the rate of each labelled frame that was drawn at random, in the drive's order.
     scores, every_score
-        ``(m,)`` theirs, and ``(n,)`` those of all frames: any number that was known before, as how
-        unsure a mask is. Where one is NaN, none is used.
+        ``(m,)`` of these frames, and ``(n,)`` of all frames: any number that was known before, for
+        example how unsure a mask is. If one is NaN, none is used.
 
     References
     ----------

@@ -20,10 +20,10 @@ from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.pdf.typeset import typeset, write_file
-from roadeval.results.comparison import as_dict, judged, junit_xml
+from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
-from roadeval.runtime.files import Paths, listed
+from roadeval.runtime.files import Paths, list_paths
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -53,12 +53,16 @@ class Compared:
     @property
     def held(self) -> list[str]:
         """The sentences of the conditions that hold."""
-        return [judged(judgement) for judgement in self.judgements if judgement.holds]
+        return [describe_judgement(judgement) for judgement in self.judgements if judgement.holds]
 
     @property
     def unjudged(self) -> list[str]:
         """Why conditions could not be judged."""
-        return [judged(judgement) for judgement in self.judgements if judgement.holds is None]
+        return [
+            describe_judgement(judgement)
+            for judgement in self.judgements
+            if judgement.holds is None
+        ]
 
 
 def compare(
@@ -81,7 +85,7 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [Path(path) for path in listed(results)]
+    paths = [Path(path) for path in list_paths(results)]
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
@@ -91,25 +95,27 @@ def compare(
         sides = variants_as_sides(whole, opened[0].variants, variants)
         opened *= len(sides)
     else:
-        sides = _sides(opened, _labels(paths), variants)
+        sides = _choose_sides(opened, _name_results(paths), variants)
     settings = opened[0].facts.evaluation
-    found = compare_sides(sides, settings, across_variants=across)
+    comparison = compare_sides(sides, settings, across_variants=across)
     labelled = [*zip(sides, opened, strict=True)]
     cut = dict.fromkeys(
-        each.name if across else side.label for side, each in labelled if not each.complete
+        result.name if across else side.label for side, result in labelled if not result.complete
     )
     partial = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
-    lost = dict.fromkeys(filter(None, map(_failed_drives, opened)))
-    found = replace(found, warnings=(*lost, *partial, *found.warnings))
+    lost = dict.fromkeys(filter(None, map(_failure_sentence, opened)))
+    comparison = replace(comparison, warnings=(*lost, *partial, *comparison.warnings))
     alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
     recordings = {
-        side.label: each.drive for side, each in labelled if each.drive and each.drive.recording
+        side.label: result.drive
+        for side, result in labelled
+        if result.drive and result.drive.recording
     }
-    judgements = tuple(judge(found, conditions, settings))
-    return Compared(found, judgements, tuple(alone or ()), recordings, tuple(lost))
+    judgements = tuple(judge(comparison, conditions, settings))
+    return Compared(comparison, judgements, tuple(alone or ()), recordings, tuple(lost))
 
 
-def _failed_drives(result: Result) -> str:
+def _failure_sentence(result: Result) -> str:
     """Return a sentence on the drives of a fleet that failed; empty without any."""
     if result.fleet is None:
         return ""
@@ -121,26 +127,26 @@ def _failed_drives(result: Result) -> str:
     return f"{result.name}: {len(failed)} of {len(drives)} drives failed, no number counts {named}"
 
 
-def _sides(
+def _choose_sides(
     opened: Sequence[Result], labels: Sequence[str], variants: Sequence[str] | None
 ) -> list[Side]:
     """Return several results, each with those of its variants that are compared."""
     pairs = [name.partition("=")[::2] for name in variants or ()]
-    of_base = {own: other or own for own, other in pairs}
+    of_base = {base_name: other or base_name for base_name, other in pairs}
     of_others = {name: name for name in of_base.values()}
-    renamed = ", ".join(own for own, other in of_base.items() if own != other)
+    renamed = ", ".join(base_name for base_name, other in of_base.items() if base_name != other)
     sides: list[Side] = []
-    for label, each in zip(labels, opened, strict=True):
+    for label, result in zip(labels, opened, strict=True):
         names = of_others if sides else of_base
-        if pairs and not {*names} & {*each.variants}:
-            wanted, known = ", ".join(names), ", ".join(each.variants)
-            raise RoadevalError(f"{label}: no variant {wanted}; there are {known}")
+        if pairs and not {*names} & {*result.variants}:
+            named_variants, there = ", ".join(names), ", ".join(result.variants)
+            raise RoadevalError(f"{label}: no variant {named_variants}; there are {there}")
         named = f"{label} ({renamed})" if renamed and not sides else label
-        sides.append(Side(named, each.compared, each.table, names if pairs else None))
+        sides.append(Side(named, result.compared, result.table, names if pairs else None))
     return sides
 
 
-def _labels(paths: Sequence[Path]) -> list[str]:
+def _name_results(paths: Sequence[Path]) -> list[str]:
     """Name each result by its file, or by its whole path where another has the same name."""
     stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
     labels: list[str] = []
@@ -250,19 +256,19 @@ def _frames(side: Side) -> pd.DataFrame:
     return side.table("frames", [side.drives[0].key])
 
 
-def _looks_of(masks: Sequence[ComparedMask]) -> dict[str, Look]:
+def _looks_of_masks(masks: Sequence[ComparedMask]) -> dict[str, Look]:
     """Return how masks are drawn: a hue a variant, a dash a result."""
     return looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
 
 
 def over_drive(compared: Compared) -> list[Chart]:
     """Return ERR over the one drive that is compared, and the baseline's; none of several."""
-    if (found := compared_masks(compared.sides)) is None:
+    if (common := compared_masks(compared.sides)) is None:
         return []
-    masks, rows = found
+    masks, rows = common
     blind = finals(only(_frames(compared.sides[0]), variant=BASELINE))
     rows = joined([rows, blind[blind["frame"].isin(rows["frame"])].assign(stage="final")])
     size = compared.comparison.settings.window
     size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
     rows = rows.assign(drive="", camera="")  # the results may call them differently
-    return over_windows(windows(rows, size), [TESTED], _looks_of(masks) | looks([BASELINE]))
+    return over_windows(windows(rows, size), [TESTED], _looks_of_masks(masks) | looks([BASELINE]))

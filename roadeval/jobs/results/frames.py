@@ -24,6 +24,7 @@ from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, fade
 from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
 from roadeval.results.sentences import notes
+from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,11 +82,11 @@ class FramePicker:
         self._recording = result.recording
         self._finals = finals(result.rows)
         self._all = values_of(result.rows, "variant")
-        self._variants = [name for name in self._all if name != BASELINE]
+        self._focus = focus_of(self._all)
         self._scored = frozenset(result.rows["frame"])
         self._parts: dict[Any, Any] = {}
-        for first in self._variants[:1]:
-            self._parts = tables.causes(result.rows, first).to_dict("index")
+        if self._focus:
+            self._parts = tables.causes(result.rows, self._focus).to_dict("index")
 
     def examples(self, numbers: Sequence[int]) -> Iterator[ExampleFrame]:
         """Yield frames for figure 2."""
@@ -101,37 +102,40 @@ class FramePicker:
             yield ExampleFrame(frame, recording.image(frame), truth, masks)
 
     def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
-        """Yield a picture of each frame: the first variant's errors, or without truth its mask."""
+        """Yield a picture of each frame: the errors of the focus, or without truth its mask."""
         recording = self._recording
         for frame in numbers if recording else ():
             assert recording is not None
-            first = recording.variants[0]
-            final = next(spec for spec in first.layers if spec.name == first.stages[-1])
+            named = {variant.name: variant for variant in recording.variants}
+            focus = named[focus_of(named) or ""]
+            final = next(spec for spec in focus.layers if spec.name == focus.stages[-1])
             spec = ERRORS if frame in self._scored else final
-            layer = recording.layer(first.name, spec.name, frame)
+            layer = recording.layer(focus.name, spec.name, frame)
             yield LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
 
     def worst(self) -> list[NotableFrame]:
-        """Return the worst frames of the first variant, one a scene, all worse than the mean.
+        """Return the worst frames of the focus, one a scene, all worse than the mean.
 
         Without truth those that are most in doubt, as far as they have pictures.
         """
-        if not self._variants:
+        if self._focus is None:
             unlabelled = self._result.facts.unlabelled
             look_at = unlabelled.look_at if unlabelled else []
             there = [frame for frame in look_at if frame in self._result.pictured]
             return [*map(self._pictured, there[:WORST])]
-        own = only(self._finals, variant=self._variants[0])
-        rows = tables.worst(own, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
-        rows = rows[rows[TESTED] >= own[TESTED].mean()]
+        focus_masks = only(self._finals, variant=self._focus)
+        rows = tables.worst(focus_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
+        rows = rows[rows[TESTED] >= focus_masks[TESTED].mean()]
         return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
         """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
         pairs = tables.changes(self._result.rows, FILTERED, UNFILTERED)
         apart, besides = scene_ns(pairs["stamp_ns"]), [frame.stamp_ns for frame in shown]
-        rows = tables.most_changed(pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides)
-        columns = rows[["frame", "stamp_ns", "change"]]
+        rows = tables.most_changed_frames(
+            pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides
+        )
+        columns = rows[["frame", "stamp_ns", "change"]].assign(variant=FILTERED)
         return [self._notable(*row) for row in columns.itertuples(index=False)]
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
@@ -147,32 +151,34 @@ class FramePicker:
         if (ground := facts.drive.ground) is None:
             return
         plan = Plan(ground, *facts.evaluation.plan, facts.evaluation.plan_width, CELL)
-        for each in made.images:
-            if each.image.shape[:2] == (ground.height, ground.width):
-                seen = None if each.array is None else plan.picture(each.array, IGNORE)
-                title = f"from above: {each.title.replace(': ', ', ')}"
-                yield LayerImage(title, plan.picture(each.image), each.spec, seen)
+        for layer in made.images:
+            if layer.image.shape[:2] == (ground.height, ground.width):
+                seen = None if layer.array is None else plan.picture(layer.array, IGNORE)
+                title = f"from above: {layer.title.replace(': ', ', ')}"
+                yield LayerImage(title, plan.picture(layer.image), layer.spec, seen)
 
     def _pictured(self, frame: int) -> NotableFrame:
         assert self._recording is not None
         return self._notable(frame, self._recording.stamps[frame])
 
-    def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
-        """Return a frame, with its pictures where they are there; without truth, too."""
+    def _notable(
+        self, frame: int, stamp_ns: int, change: float | None = None, variant: str | None = None
+    ) -> NotableFrame:
+        """Return a frame of a variant, by default the focus, with its pictures if there are any."""
         result, seen = self._result, self._recording
         if frame not in result.pictured:
             seen = None
         layers = [*self._layers(seen, frame)] if seen and change is None else []
-        if not self._variants or frame not in self._scored:
+        if (variant := variant or self._focus) is None or frame not in self._scored:
             assert seen is not None
             images, notes = [LayerImage("camera", seen.image(frame))], seen.notes(frame)
             return NotableFrame(frame, stamp_ns, "", {}, notes=notes, images=images, layers=layers)
-        first, own = self._variants[0], only(self._finals, frame=frame).set_index("variant")
+        masks = only(self._finals, frame=frame).set_index("variant")
         return NotableFrame(
-            *(frame, stamp_ns, first, dict[Any, Any](own[[*SHORT]].to_dict("index"))),
-            parts=self._parts.get(frame, {}),
+            *(frame, stamp_ns, variant, dict[Any, Any](masks[[*SHORT]].to_dict("index"))),
+            parts=self._parts.get(frame, {}) if variant == self._focus else {},
             change=change,
-            notes=result.notes(frame, first),
+            notes=result.notes(frame, variant),
             images=[*self._outcomes_of(seen, frame)] if seen else [],
             layers=layers,
         )
@@ -203,7 +209,9 @@ class FramePicker:
             ]
             arrays = ((spec, self._result.layer(variant.name, spec.name, frame)) for spec in specs)
             row = [LayerImage(s.name, image, s, array) for s, array in arrays if array is not None]
-            row[:1] = [replace(each, title=f"{variant.name}: {each.title}") for each in row[:1]]
+            row[:1] = [
+                replace(picture, title=f"{variant.name}: {picture.title}") for picture in row[:1]
+            ]
             yield row
 
 
@@ -220,7 +228,7 @@ def browsed(result: DriveResult) -> FrameBrowser:
         titles=names,
         charts=over_frames(frames, names),
         command=result.inspect("{}") if result.recording else "",
-        masks=[f"{each.name}: {each.stages[-1]}" for each in there],
+        masks=[f"{variant.name}: {variant.stages[-1]}" for variant in there],
     )
 
 
@@ -231,7 +239,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         doubts = [*rates_by_frame(result.table("unlabelled"), [*SIGNS])]
         seen = {frame for frame, _, _ in doubts}
         stamps = result.recording.stamps if result.recording else {}
-        doubts += [(each, stamps[each], {}) for each in result.pictured if each not in seen]
+        doubts += [(number, stamps[number], {}) for number in result.pictured if number not in seen]
         yield from (
             NotableFrame(frame, stamp, "", rates)
             for frame, stamp, rates in sorted(doubts, key=itemgetter(0))
@@ -239,27 +247,27 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         return
     for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
-        others = {name: each for name, each in rates.items() if name != BASELINE}
-        words, conditions = [*notes(others, blind)], [*_conditions(others, blind)]
+        others = {name: rate for name, rate in rates.items() if name != BASELINE}
+        words, conditions = [*notes(others, blind)], [*_frame_conditions(others, blind)]
         yield NotableFrame(frame, stamp, "", rates, notes=words, conditions=conditions)
 
 
-def _conditions(
+def _frame_conditions(
     rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
 ) -> Iterator[str]:
-    """Yield what is true of a frame, in words: the first variant's health, and the filter."""
-    first = next(iter(rates), None)
-    if first is None:
+    """Yield what is true of a frame, in words: the health of the focus, and the filter."""
+    focus = focus_of(rates)
+    if focus is None:
         return
-    health = judge(rates[first], blind)
+    health = judge(rates[focus], blind)
     if health is not Health.OK:
-        yield f"{first} {health}"
+        yield f"{focus} {health}"
     if FILTERED in rates and UNFILTERED in rates:
         change = rates[FILTERED][TESTED] - rates[UNFILTERED][TESTED]
         if abs(change) >= NOTEWORTHY:
             yield "the filter harms" if change > 0 else "the filter helps"
-    if blind is not None and rates[first][TESTED] > blind[TESTED]:
-        yield f"{first} worse than {BASELINE}"
+    if blind is not None and rates[focus][TESTED] > blind[TESTED]:
+        yield f"{focus} worse than {BASELINE}"
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
@@ -269,7 +277,7 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     """
     if result.recording is None:
         return []
-    chosen = _chosen(result, PICTURED)
+    chosen = _choose_frames(result, PICTURED)
     picker, strips = FramePicker(result, None, None), []
     for done, frame in enumerate(chosen, 1):
         made = picker.strip(frame)
@@ -282,23 +290,25 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     return sorted(strips, key=lambda strip: strip.frame)
 
 
-def _chosen(result: DriveResult, count: int) -> list[int]:
+def _choose_frames(result: DriveResult, count: int) -> list[int]:
     """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
     rows = result.rows
     scored_frames = {*rows["frame"]}
     there = [number for number in result.pictured if number in scored_frames]
     pictured = there or [*result.pictured]
-    variants = [name for name in values_of(rows, "variant") if name != BASELINE]
+    focus = focus_of(values_of(rows, "variant"))
     count = min(count, len(pictured))
     spread = evenly(pictured, count)
-    if not variants:
+    if focus is None:
         unlabelled = result.facts.unlabelled
-        asked = [each for each in (unlabelled.look_at if unlabelled else ()) if each in pictured]
-        return list(dict.fromkeys([*asked, *spread]))[:count]
-    own = finals(only(rows, variant=variants[0]))
-    own = own[own["frame"].isin(pictured)]
-    worst = tables.worst(own, count)["frame"].tolist()
-    best = tables.worst(own, len(own), apart_ns=0)["frame"].tolist()[::-1]
+        doubtful = [
+            frame for frame in (unlabelled.look_at if unlabelled else ()) if frame in pictured
+        ]
+        return list(dict.fromkeys([*doubtful, *spread]))[:count]
+    masks = finals(only(rows, variant=focus))
+    masks = masks[masks["frame"].isin(pictured)]
+    worst = tables.worst(masks, count)["frame"].tolist()
+    best = tables.worst(masks, len(masks), apart_ns=0)["frame"].tolist()[::-1]
     turns: list[int] = []
     for place in range(count):
         turns += worst[2 * place : 2 * place + 2]

@@ -19,6 +19,7 @@ from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
+from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -57,28 +58,28 @@ def worst_frames(
 ) -> list[WorstFrame]:
     """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
 
-    Where nothing was scored, they are ranked by how much the mask is in doubt, one a scene.
-    Of a fleet the frames of all drives are ranked together, all that are known by default, and
-    always of the first variant. A `RoadevalError` if there is nothing to rank by, as where ERR is
-    undefined on every frame, or there is no such variant.
+    The mask is that of the focus by default. If nothing was scored, frames are ranked by how much
+    it is in doubt, one a scene. Of a fleet the frames of all drives are ranked together, all that
+    are known by default, and always of the focus. A `RoadevalError` if there is nothing to rank by,
+    as when ERR is undefined on every frame, or there is no such variant.
     """
     if fleet := result.fleet:
         if fleet.worst.empty:
             raise _nothing_scored(fleet.path)
         return [_of_fleet(fleet, row) for row in records(fleet.worst[:count])]
-    cameras = result.rig or [each for each in [result.drive] if each]
-    found = [frame for each in cameras for frame in _ranked(each, count or LISTED, variant)]
-    found = sorted(found, key=lambda each: -(each.rates[each.by] or 0.0))[: count or LISTED]
-    found = [replace(each, rank=rank) for rank, each in enumerate(found, 1)]
-    if not found:
+    cameras = result.rig or [drive for drive in [result.drive] if drive]
+    frames = [frame for camera in cameras for frame in _ranked(camera, count or LISTED, variant)]
+    frames = sorted(frames, key=lambda frame: -(frame.rates[frame.by] or 0.0))[: count or LISTED]
+    frames = [replace(frame, rank=rank) for rank, frame in enumerate(frames, 1)]
+    if not frames:
         (path,) = result.paths
         if not (scored := _scored(cameras[0])):
             raise _nothing_scored(path)
         raise RoadevalError(
-            f"{path}: ERR of {variant or scored[0]} is undefined on "
+            f"{path}: ERR of {variant or focus_of(scored)} is undefined on "
             "every frame, so no frame is the worst"
         )
-    return found
+    return frames
 
 
 def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
@@ -102,15 +103,15 @@ def _ranked(
         names, rates = values_of(rows, "variant"), tuple(SIGNS)
     if not names:
         raise _nothing_scored(drive.path)
-    chosen = variant or names[0]
+    chosen = variant or focus_of(names) or names[0]
     if chosen not in names:
         raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
-    own = finals(only(rows, variant=chosen))
-    by = TESTED if TESTED in rates else sign_of(own)
+    masks = finals(only(rows, variant=chosen))
+    by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
         return []
     apart = None if by == TESTED else tables.scene_ns(rows["stamp_ns"])
-    looked_at = own if among is None else own[own["frame"].isin([*among])]
+    looked_at = masks if among is None else masks[masks["frame"].isin([*among])]
     ranked = tables.worst(looked_at, count, by, apart).to_dict("records")
     parts: dict[Any, Any] = {}
     if by == TESTED:
@@ -134,7 +135,8 @@ def drive_of(result: Result, frame: WorstFrame) -> tuple[DriveResult, str]:
     if result.fleet:
         return DriveResult(recording_of(result.fleet, frame.drive)), f"{frame.drive}, "
     if result.rig:
-        return next(each for each in result.rig if each.camera == frame.camera), f"{frame.camera}, "
+        camera = next(drive for drive in result.rig if drive.camera == frame.camera)
+        return camera, f"{frame.camera}, "
     assert result.drive is not None
     return result.drive, ""
 
@@ -166,18 +168,18 @@ def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame
 
     A `RoadevalError` if there are fewer, or as of `worst_frames`.
     """
-    found = worst_frames(result, rank, variant)
-    if rank > len(found):
+    frames = worst_frames(result, rank, variant)
+    if rank > len(frames):
         (path,) = result.paths
         raise RoadevalError(
-            f"{path}: there is no worst frame number {rank}: {len(found)} are ranked, of "
+            f"{path}: there is no worst frame number {rank}: {len(frames)} are ranked, of "
             "neighbouring frames the worst alone"
         )
-    return found[-1]
+    return frames[-1]
 
 
 def worst(drive: DriveResult, variant: str | None = None) -> WorstFrame | None:
-    """Return the worst frame that has pictures, of a variant or else of the first one.
+    """Return the worst frame that has pictures, of a variant or else of the focus.
 
     None if no frame with pictures was scored. A `RoadevalError` if the variant was not scored.
     """

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from roadeval.config.run import RunConfig, run_toml
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.score.unlabelled import chosen, sign_of
+from roadeval.evaluation.score.unlabelled import choose_frames, sign_of
 from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
@@ -96,27 +96,29 @@ def pick(
     """
     from roadeval.jobs.run.replay import replay
 
-    given = [source] if isinstance(source, str | PathLike) else [*source]
-    if not given:
+    sources = [source] if isinstance(source, str | PathLike) else [*source]
+    if not sources:
         raise RoadevalError("nothing to pick from: name a result, a log or a fleet")
     with TemporaryDirectory(prefix="roadeval-") as place:
         drives, config = [], config or RunConfig()
         masks = config.override({"output": {"record": "masks", "figures": False}})
-        for number, each in enumerate(part for one in given for part in _parts(Path(one))):
-            made, run = each, None
-            if each.suffix != ".rrd":
-                made, run = Path(place, f"{number}.rrd"), run_toml(config, each.name, VERSION)
+        for number, path in enumerate(
+            part for one in sources for part in _find_recordings(Path(one))
+        ):
+            made, run = path, None
+            if path.suffix != ".rrd":
+                made, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
                 own_reports = Path(place, "reports")
-                replay(each, masks, save=made, reports=own_reports, on_progress=on_progress)
+                replay(path, masks, save=made, reports=own_reports, on_progress=on_progress)
             drive = Result(made).drive
             if drive is None or drive.recording is None:
                 raise RoadevalError(
                     f"{made}: frames are picked from a recording of one camera; give the log, and "
                     "of several cameras one with --image-topic"
                 )
-            drives.append((each, drive, run))
+            drives.append((path, drive, run))
         if not drives:
-            raise RoadevalError(f"{given[0]}: no recording was kept; replay it with --keep all")
+            raise RoadevalError(f"{sources[0]}: no recording was kept; replay it with --keep all")
         many = len(drives) > 1
         names = [drive.name for _, drive, _ in drives]
         if len({*names}) < len(names):
@@ -124,13 +126,15 @@ def pick(
         how = labels, variant, seed
         lengths = [drive.table("unlabelled")["frame"].nunique() for _, drive, _ in drives]
         return [
-            _picked(drive, _Wanted(each, own, Path(folder, *[drive.name] * many), *how, run))
-            for (each, drive, run), own in zip(drives, _shares(lengths, count), strict=True)
-            if own
+            _pick_frames(
+                drive, _Request(path, share, Path(folder, *[drive.name] * many), *how, run)
+            )
+            for (path, drive, run), share in zip(drives, _share_out(lengths, count), strict=True)
+            if share
         ]
 
 
-def _parts(source: Path) -> list[Path]:
+def _find_recordings(source: Path) -> list[Path]:
     """Return the recordings that a fleet has kept, or that of a results folder; else itself."""
     if not is_fleet(source):
         if not (source / SUMMARY).is_file():
@@ -143,21 +147,21 @@ def _parts(source: Path) -> list[Path]:
     return [path for name in drives.index if (path := recording_path(source, name)).exists()]
 
 
-def _shares(sizes: Sequence[int], count: int) -> list[int]:
+def _share_out(sizes: Sequence[int], count: int) -> list[int]:
     """Share a number out in proportion to sizes, by the largest remainders.
 
-    >>> _shares([100, 50, 51], 10)
+    >>> _share_out([100, 50, 51], 10)
     [5, 2, 3]
     """
     exact = np.array(sizes) * count / max(sum(sizes), 1)
-    whole = np.floor(exact).astype(int)
-    whole[np.argsort(whole - exact, kind="stable")[: count - whole.sum()]] += 1
-    found: list[int] = whole.tolist()
-    return found
+    shares = np.floor(exact).astype(int)
+    shares[np.argsort(shares - exact, kind="stable")[: count - shares.sum()]] += 1
+    frames: list[int] = shares.tolist()
+    return frames
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _Request:
     """The options of `pick` for one drive: its share of the frames, and its folder."""
 
     source: Path
@@ -171,47 +175,49 @@ class _Wanted:
     """The configuration as TOML, of a log that was replayed here; None of a recording."""
 
 
-def _picked(drive: DriveResult, wanted: _Wanted) -> Outcome:
+def _pick_frames(drive: DriveResult, request: _Request) -> Outcome:
     """Pick frames of a recording and write them."""
     rows = drive.table("unlabelled")
     names = values_of(rows, "variant")
     if not names:
-        raise RoadevalError(f"{wanted.source}: every frame has truth, or none was replayed")
-    if (name := wanted.variant or names[0]) not in names:
-        raise RoadevalError(f"{wanted.source}: no variant {name}; there are {', '.join(names)}")
-    own = only(rows, variant=name)
-    known = _known(drive, own, name, wanted)
-    scores = known.every_score()
-    if (sign := sign_of(own)) is not None:  # how much they are in doubt by now
-        now = dict(zip(map(float, own["stamp_ns"]), own[sign], strict=True))
-        scores = np.array([now.get(float(stamp), np.nan) for stamp in known.stamps])
-    taken = [known.places[stamp] for stamp in known.by_stamp]
-    stamps = np.array(known.stamps, np.int64)
-    places = chosen(stamps, scores, wanted.count, known.seed, drawn=known.drawn, taken=taken)
-    random, ranked = (each.tolist() for each in places)
-    frames = [known.frames[place] for place in {*random, *ranked} - {*taken}]
+        raise RoadevalError(f"{request.source}: every frame has truth, or none was replayed")
+    if (name := request.variant or names[0]) not in names:
+        raise RoadevalError(f"{request.source}: no variant {name}; there are {', '.join(names)}")
+    doubts = only(rows, variant=name)
+    picks_before = _read_picks(drive, doubts, name, request)
+    scores = picks_before.every_score()
+    if (sign := sign_of(doubts)) is not None:  # how much they are in doubt by now
+        now = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
+        scores = np.array([now.get(float(stamp), np.nan) for stamp in picks_before.stamps])
+    taken = [picks_before.places[stamp] for stamp in picks_before.by_stamp]
+    stamps = np.array(picks_before.stamps, np.int64)
+    places = choose_frames(
+        stamps, scores, request.count, picks_before.seed, drawn=picks_before.drawn, taken=taken
+    )
+    random, ranked = (numbers.tolist() for numbers in places)
+    frames = [picks_before.frames[place] for place in {*random, *ranked} - {*taken}]
     if lacking := sorted({*frames} - {*drive.pictured}):
         raise RoadevalError(
-            f"{wanted.source}: no pictures of frame {lacking[0]}; replay with --record masks"
+            f"{request.source}: no pictures of frame {lacking[0]}; replay with --record masks"
         )
-    (stage, *_), masks = own["stage"], {}
+    (stage, *_), masks = doubts["stage"], {}
     for frame in frames:
         mask = drive.layer(name, stage, frame)
         assert mask is not None
         masks[frame] = mask == 1
     digests = {frame: digest_of(mask) for frame, mask in masks.items()}
-    picks, new = _with(known, random, ranked, digests)
-    _write(drive, picks, [(each, masks[each.frame]) for each in new], wanted)
+    picks, new = _add_picks(picks_before, random, ranked, digests)
+    _write_picks(drive, picks, [(frame, masks[frame.frame]) for frame in new], request)
     log = drive.facts.log
-    repeats = wanted.folder / RUN if wanted.run else drive.path
-    return Outcome(wanted.folder, picks, len(new), log.path if log else drive.name, repeats)
+    repeats = request.folder / RUN if request.run else drive.path
+    return Outcome(request.folder, picks, len(new), log.path if log else drive.name, repeats)
 
 
-def _known(drive: DriveResult, own: pd.DataFrame, variant: str, wanted: _Wanted) -> Picks:
+def _read_picks(drive: DriveResult, doubts: pd.DataFrame, variant: str, request: _Request) -> Picks:
     """Return the picks that a folder holds, or ones without a frame."""
-    folder, facts = wanted.folder, drive.facts
-    found = Picks.read(folder)
-    if found is None:
+    folder, facts = request.folder, drive.facts
+    picks = Picks.read(folder)
+    if picks is None:
         # Files that a killed run has left are written again.
         left = {*folder.rglob("*")} if folder.exists() else set()
         begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
@@ -220,86 +226,89 @@ def _known(drive: DriveResult, own: pd.DataFrame, variant: str, wanted: _Wanted)
         labels = {file for file in left if folder / LABELS in file.parents}
         if labels or left - begun - proposed:
             raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
-        return _nothing_yet(drive, own, variant, wanted)
-    if (found.log, found.camera) != (facts.log_digest, facts.drive.camera):
+        return _empty_picks(drive, doubts, variant, request)
+    if (picks.log, picks.camera) != (facts.log_digest, facts.drive.camera):
         raise RoadevalError(f"{folder}: its frames are of another log; name a folder of its own")
-    return found
+    return picks
 
 
-def _write(
+def _write_picks(
     drive: DriveResult,
     picks: Picks,
     new: Sequence[tuple[Picked, npt.NDArray[np.bool_]]],
-    wanted: _Wanted,
+    request: _Request,
 ) -> None:
     """Write images, masks to correct, and last what was picked."""
-    recording, folder = drive.recording, wanted.folder
+    recording, folder = drive.recording, request.folder
     assert recording is not None
     with writing(folder, RoadevalError):
         for part in (IMAGES, PROPOSALS, LABELS):
             (folder / part).mkdir(parents=True, exist_ok=True)
         proposals = []
-        for each, mask in new:
-            name = f"{each.stamp_ns:019d}.png"
-            (folder / IMAGES / name).write_bytes(png_of(recording.image(each.frame)))
+        for frame, mask in new:
+            name = f"{frame.stamp_ns:019d}.png"
+            (folder / IMAGES / name).write_bytes(png_of(recording.image(frame.frame)))
             proposals.append(Proposal(name, mask))
         files = (
-            {each.image: png_of(np.uint8(255) * each.road) for each in proposals}
-            if wanted.labels == PNG
+            {frame.image: png_of(np.uint8(255) * frame.road) for frame in proposals}
+            if request.labels == PNG
             else as_coco(proposals)
         )
         for name, content in files.items():
             path = folder / PROPOSALS / name
             wave = new[0][0].wave if path.exists() else ""
             path.with_name(f"{wave}{name}").write_bytes(content)
-        if wanted.run:
-            put(folder / RUN, wanted.run.encode())
+        if request.run:
+            put(folder / RUN, request.run.encode())
         put(folder / PICK, picks.text().encode())
 
 
-def _nothing_yet(drive: DriveResult, own: pd.DataFrame, variant: str, wanted: _Wanted) -> Picks:
+def _empty_picks(drive: DriveResult, rows: pd.DataFrame, variant: str, request: _Request) -> Picks:
     """Return picks without a frame: those of a result that can be picked, and their doubt."""
-    stamps, sign = own["stamp_ns"].tolist(), sign_of(own)
+    stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
     if len({*stamps}) < len(stamps):
         raise RoadevalError(
-            f"{wanted.source}: several frames have one stamp, so no label finds its own"
+            f"{request.source}: several frames have one stamp, so no label finds its own"
         )
-    doubts = own[sign].tolist() if sign else [np.nan] * len(own)
+    doubts = rows[sign].tolist() if sign else [np.nan] * len(rows)
     method = {"variant": variant, "ranked_by": sign, "identity": drive.properties.get("input")}
     return Picks(
         drive=drive.name,
         camera=drive.facts.drive.camera,
         log=drive.facts.log_digest,
         method=method,
-        seed=wanted.seed,
+        seed=request.seed,
         drawn=0,
-        frames=own["frame"].tolist(),
+        frames=rows["frame"].tolist(),
         stamps=stamps,
         scores=[doubt if np.isfinite(doubt) else None for doubt in doubts],
         picked=[],
     )
 
 
-def _with(
-    known: Picks, random: Sequence[int], ranked: Sequence[int], proposals: Mapping[int, str]
+def _add_picks(
+    picks: Picks, random: Sequence[int], ranked: Sequence[int], proposals: Mapping[int, str]
 ) -> tuple[Picks, list[Picked]]:
     """Return the picks with some more, and those that are new, by the drive's order.
 
     A frame that was ranked before, and is drawn now, becomes a random one.
     """
-    drawn, wave = known.drawn + len(random), max((e.wave for e in known.picked), default=0) + 1
-    probability, stamps = drawn / len(known.stamps), {known.stamps[place] for place in random}
+    drawn, wave = (
+        picks.drawn + len(random),
+        max((earlier.wave for earlier in picks.picked), default=0) + 1,
+    )
+    probability, stamps = drawn / len(picks.stamps), {picks.stamps[place] for place in random}
     old = [
-        replace(each, why=Why.RANDOM, probability=probability)
-        if each.why is Why.RANDOM or each.stamp_ns in stamps
-        else each
-        for each in known.picked
+        replace(earlier, why=Why.RANDOM, probability=probability)
+        if earlier.why is Why.RANDOM or earlier.stamp_ns in stamps
+        else earlier
+        for earlier in picks.picked
     ]
     new = []
     for place in sorted({*random, *ranked}):
-        if float(stamp := known.stamps[place]) not in known.by_stamp:
+        if float(stamp := picks.stamps[place]) not in picks.by_stamp:
             why, chance = (Why.RANDOM, probability) if place in random else (Why.RANKED, None)
-            frame = known.frames[place]
-            own = why, chance, known.scores[place], proposals[frame], wave
-            new.append(Picked(frame, stamp, *own))
-    return replace(known, drawn=drawn, picked=[*old, *new]), new
+            frame = picks.frames[place]
+            about = why, chance, picks.scores[place], proposals[frame], wave
+            new.append(Picked(frame, stamp, *about))
+    return replace(picks, drawn=drawn, picked=[*old, *new]), new

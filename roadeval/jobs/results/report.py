@@ -51,8 +51,8 @@ def write_report(
     """
     opened = result if isinstance(result, Result) else Result(result)
     (source,) = opened.paths
-    own = opened.drive.camera if opened.drive else ""
-    camera = f"-{as_plain(own)}" if own else ""
+    name = opened.drive.camera if opened.drive else ""
+    camera = f"-{as_plain(name)}" if name else ""
     usual = Path("reports", f"{source.stem}{camera}.pdf") if opened.recording else None
     path = Path(output or usual or source / f"report{camera}.pdf")
     if not (output or usual) and leads_outside(path, source):  # it may come from someone else
@@ -117,19 +117,19 @@ def collect(result: DriveResult) -> Findings:
 
 def collect_rig(result: Result) -> Findings:
     """Collect everything that the report of several cameras shows."""
-    own = {each.camera: collect(each) for each in result.rig}
-    first, names, facts = next(iter(own.values())), short_names([*own]), result.facts
+    by_camera = {drive.camera: collect(drive) for drive in result.rig}
+    first, names, facts = next(iter(by_camera.values())), short_names([*by_camera]), result.facts
     assert isinstance(facts, Facts)
     return Findings(
         path=first.path,
         facts=facts,
         complete=first.complete,
         again=first.again,
-        pictured=sum(each.pictured for each in own.values()),
+        pictured=sum(findings.pictured for findings in by_camera.values()),
         thumbnails=[
             replace(image, title=f"{names[camera]}, {image.title}")
-            for camera, each in own.items()
-            for image in each.thumbnails[:1]
+            for camera, findings in by_camera.items()
+            for image in findings.thumbnails[:1]
         ],
-        cameras=own,
+        cameras=by_camera,
     )

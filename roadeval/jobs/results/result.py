@@ -39,7 +39,7 @@ from roadeval.results.rows import (
     scores,
     table_of,
 )
-from roadeval.results.sentences import verdict
+from roadeval.results.verdict import verdict
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from roadeval.recording.recording import Recording
 
 OF_ALL: Final = ("code of ", "network ")
-"""What `contents` calls files that all drives of a fleet share."""
+"""What `input_digests` calls files that all drives of a fleet share."""
 NO_NUMBER: Final = ("output", "run", "fleet")
 """Tables of a run's settings that change no number."""
 
@@ -96,8 +96,8 @@ class DriveResult:
     def again(self) -> str:
         """The command that makes the results again; empty where a run left no configuration."""
         path = self.path if self.recording else self.path / RUN
-        known = self.recording.result("run") if self.recording else path.exists()
-        if not known or self.facts.log is None:
+        has_configuration = self.recording.result("run") if self.recording else path.exists()
+        if not has_configuration or self.facts.log is None:
             return ""
         return shlex.join(["roadeval", "replay", self.facts.log.path, "--config", str(path)])
 
@@ -224,7 +224,7 @@ class DriveResult:
         """Return the recording's notes on a frame, without those on other variants."""
         if self.recording is None:
             return ()
-        others = {each.name for each in self.recording.variants} - {variant}
+        others = {layout.name for layout in self.recording.variants} - {variant}
         notes = self.recording.notes(frame)
         return tuple(note for note in notes if note.partition(" ")[0] not in others)
 
@@ -274,7 +274,7 @@ class Result:
 
     def __init__(self, *paths: str | Path) -> None:
         self.paths = tuple(map(Path, paths))
-        self._opened: list[Opened] = [each for path in self.paths for each in _open(path)]
+        self._opened: list[Opened] = [result for path in self.paths for result in _open(path)]
 
     @cached_property
     def cameras(self) -> dict[str, Result]:
@@ -288,13 +288,13 @@ class Result:
     @property
     def rig(self) -> list[DriveResult]:
         """The cameras of a drive, where the result of several was opened alone; else none."""
-        cameras = [each for each in self._opened if isinstance(each, DriveResult)]
+        cameras = [result for result in self._opened if isinstance(result, DriveResult)]
         return cameras if len(self.paths) == 1 < len(cameras) else []
 
     @property
     def name(self) -> str:
         """The drive's or the fleet's name; of several results all of them."""
-        return ", ".join(each.name for each in self.rig[:1] or self._opened)
+        return ", ".join(result.name for result in self.rig[:1] or self._opened)
 
     @property
     def fleet(self) -> FleetFolder | None:
@@ -333,8 +333,8 @@ class Result:
     @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings that a reader should see first."""
-        own = (each.warnings for each in self._opened if isinstance(each, DriveResult))
-        return tuple(dict.fromkeys(chain.from_iterable(own)))
+        warnings = (result.warnings for result in self._opened if isinstance(result, DriveResult))
+        return tuple(dict.fromkeys(chain.from_iterable(warnings)))
 
     @property
     def recording(self) -> Path | None:
@@ -346,19 +346,25 @@ class Result:
     @cached_property
     def variants(self) -> list[str]:
         """The variants that were scored, in order."""
-        found = (
-            each.facts.finals if isinstance(each, FleetFolder) else each.rows["variant"].unique()
-            for each in self._opened
+        names = (
+            result.facts.finals
+            if isinstance(result, FleetFolder)
+            else result.rows["variant"].unique()
+            for result in self._opened
         )
-        return [*dict.fromkeys(chain(*found))]
+        return [*dict.fromkeys(chain(*names))]
 
     @cached_property
     def compared(self) -> tuple[ComparedDrive, ...]:
         """The drives, as a comparison knows them."""
         return tuple(
             drive
-            for each in self._opened
-            for drive in (_members(each) if isinstance(each, FleetFolder) else [_alone(each)])
+            for result in self._opened
+            for drive in (
+                _compared_drives(result)
+                if isinstance(result, FleetFolder)
+                else [_compared_drive(result)]
+            )
         )
 
     @cached_property
@@ -390,7 +396,7 @@ class Result:
     def windows(self) -> pd.DataFrame:
         """A row per window of evaluated frames, variant and stage of every drive."""
         size = self.facts.evaluation.window
-        return joined([tables.windows(each.table("frames"), size) for each in self._opened])
+        return joined([tables.windows(result.table("frames"), size) for result in self._opened])
 
     def table(self, name: str, drives: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
         """Return a table of all drives, or of some, by drive and camera.
@@ -398,29 +404,29 @@ class Result:
         Of a fleet's ``regions`` it has the rows of final masks alone.
         """
         parts = []
-        for each in self._opened:
-            if isinstance(each, FleetFolder):
+        for result in self._opened:
+            if isinstance(result, FleetFolder):
                 names = None if drives is None else {drive for drive, _ in drives}
-                parts.append(each.table(name, names))
-            elif drives is None or each.key in drives:
-                parts.append(each.table(name))
+                parts.append(result.table(name, names))
+            elif drives is None or result.key in drives:
+                parts.append(result.table(name))
         return joined(parts)
 
 
-def _alone(result: DriveResult) -> ComparedDrive:
+def _compared_drive(result: DriveResult) -> ComparedDrive:
     facts, frames = result.facts, result.rows["frame"].nunique()
-    settings = asked(facts.run) | contents(facts)
+    settings = number_settings(facts.run) | input_digests(facts)
     return ComparedDrive(*result.key, result.title, facts.log_digest, frames, settings)
 
 
-def _members(fleet: FleetFolder) -> Iterator[ComparedDrive]:
-    settings, drives = asked(fleet.facts.run), records(fleet.drives)
+def _compared_drives(fleet: FleetFolder) -> Iterator[ComparedDrive]:
+    settings, drives = number_settings(fleet.facts.run), records(fleet.drives)
     scored = next((row["drive"] for row in drives if row["evaluated"]), None)
     if scored is not None:
         with suppress(RoadevalError):  # the folders of its drives may be gone
-            files = contents(ResultsFolder(results_path(fleet.path, scored)).facts)
+            files = input_digests(ResultsFolder(results_path(fleet.path, scored)).facts)
             # Masks and truth of one drive say nothing of the others'.
-            settings |= {name: each for name, each in files.items() if name.startswith(OF_ALL)}
+            settings |= {name: value for name, value in files.items() if name.startswith(OF_ALL)}
     for row in drives:
         yield ComparedDrive(
             drive=row["drive"],
@@ -428,38 +434,38 @@ def _members(fleet: FleetFolder) -> Iterator[ComparedDrive]:
             name=fleet.names[row["drive"]],
             digest=row["log_digest"] or None,
             frames=row["evaluated"] or 0,
-            asked=settings,
+            settings=settings,
             group=row["group"],
         )
 
 
-def asked(run: Mapping[str, Any]) -> dict[str, Any]:
+def number_settings(run: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a run that may change its numbers, by names as ``frames.scale``."""
-    found: dict[str, Any] = {}
-    for table, own in run.items():
+    settings: dict[str, Any] = {}
+    for table, values in run.items():
         if table in NO_NUMBER:
             continue
-        nested = own.items() if isinstance(own, dict) else [("", own)]
-        found |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
-    return found
+        nested = values.items() if isinstance(values, dict) else [("", values)]
+        settings |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
+    return settings
 
 
-def contents(facts: Facts) -> dict[str, str]:
+def input_digests(facts: Facts) -> dict[str, str]:
     """Return the digests of what a run took from files, by names as ``masks mine``."""
-    found = {}
+    digests = {}
     for variant, stages in facts.methods.items():
-        for about in filter(lambda each: isinstance(each, Mapping), stages.values()):
+        for about in filter(lambda stage: isinstance(stage, Mapping), stages.values()):
             name = f"code of {variant} ({about.get('stage')})"
-            found[name] = _digest(about, "sha256")
+            digests[name] = _short_digest(about, "sha256")
     for variant in facts.settings:
-        found[f"network {variant}"] = _digest(facts.settings, variant, "net", "sha256")
+        digests[f"network {variant}"] = _short_digest(facts.settings, variant, "net", "sha256")
     for name in facts.masks:
         shown = name if name == "truth" else f"masks {name}"
-        found[shown] = _digest(facts.masks, name, "sha256")
-    return {name: digest for name, digest in found.items() if digest}
+        digests[shown] = _short_digest(facts.masks, name, "sha256")
+    return {name: digest for name, digest in digests.items() if digest}
 
 
-def _digest(value: Any, *keys: str) -> str:
+def _short_digest(value: Any, *keys: str) -> str:
     """Return the first letters of the digest that lies at some keys; empty where none does."""
     for key in keys:
         value = value.get(key) if isinstance(value, Mapping) else None

@@ -28,18 +28,18 @@ from roadeval.jobs.run.fleet_work import (
     DriveTask,
     FoldModel,
     FoldTask,
-    done,
     ending_the_run,
-    failed,
+    find_valid,
+    mark_failed,
     replay_drive,
+    report_drive,
     train_fold,
-    valid,
 )
 from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.files import AnyPath, Paths, listed, sha256_of
+from roadeval.runtime.files import AnyPath, Paths, list_paths, sha256_of
 from roadeval.version import VERSION
 
 
@@ -95,10 +95,10 @@ def replay_fleet(
         Called in the caller's thread as drives are done.
     """
     config = (config or RunConfig()).resolved()
-    entries = find_drives([str(drive) for drive in listed(drives)])
+    entries = find_drives([str(drive) for drive in list_paths(drives)])
     if config.cameras:
         entries = cameras_apart(
-            [own for each in entries for own in each.of_cameras(config.cameras)]
+            [camera for entry in entries for camera in entry.of_cameras(config.cameras)]
         )
     if config.fleet.folds is not None and config.training.model is not None:
         raise FleetError(
@@ -115,9 +115,9 @@ def replay_fleet(
     asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
     facts = writer.finish(members, config.evaluation, config.as_dict(), text, asked=asked)
-    counts = Counter(each.status for each in run.done.values())
+    counts = Counter(drive.status for drive in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
-    replayed = sum(not each.repeated for each in run.done.values())
+    replayed = sum(not drive.repeated for drive in run.done.values())
     return FleetOutcome(writer.folder, counts, replayed, problems, facts)
 
 
@@ -148,15 +148,17 @@ class FleetRun:
     def show(self, stage: str) -> None:
         """Report the progress to the caller."""
         done, detail = self.done.values(), []
-        if failed := sum(each.status == FAILED for each in done):
+        if failed := sum(drive.status == FAILED for drive in done):
             detail.append(f"{failed} failed")
         if stage == "replaying" and (left := len(self.entries) - len(done)):
             detail.append(f"{min(left, self.workers)} running")
         progress = Progress(len(done), len(self.entries), stage, "", "drives", ", ".join(detail))
         self.on_progress(progress)
 
-    def _task(self, entry: DriveEntry, own: RunConfig, model: str, fold: int | None) -> DriveTask:
-        return DriveTask(self.folder, entry, own, software(own), model, fold)
+    def _task(
+        self, entry: DriveEntry, config: RunConfig, model: str, fold: int | None
+    ) -> DriveTask:
+        return DriveTask(self.folder, entry, config, software(config), model, fold)
 
     def _by_model(self) -> Iterator[DriveTask]:
         """Yield the tasks of drives that one model scores, or that train their own."""
@@ -173,11 +175,11 @@ class FleetRun:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
         waiting = []
         for task in tasks:
-            made = valid(task) if task.entry.path is not None else None
+            made = find_valid(task) if task.entry.path is not None else None
             if made is None:
                 waiting.append(task)
             else:
-                self.done[made.drive] = done(self.folder, made, repeated=True)
+                self.done[made.drive] = report_drive(self.folder, made, repeated=True)
         return waiting
 
     def _engine(self) -> Executor:
@@ -194,12 +196,12 @@ class FleetRun:
         configs = {entry.id: entry.config(settings) for entry in self.entries}
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
-        asked = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
+        drawn = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
         training = [
             FoldTask(
                 self.folder,
                 fold,
-                tuple((e, configs[e.id]) for e in asked if folds[e.id] != fold),
+                tuple((e, configs[e.id]) for e in drawn if folds[e.id] != fold),
                 settings,
                 software(settings),
             )
@@ -211,8 +213,10 @@ class FleetRun:
         tasks = []
         for entry in self.entries:
             fold = made[folds[entry.id]]
-            own = configs[entry.id].override({"training": {"model": str(training[fold.fold].path)}})
-            task = self._task(entry, own, fold.sha256, fold.fold)
+            config = configs[entry.id].override(
+                {"training": {"model": str(training[fold.fold].path)}}
+            )
+            task = self._task(entry, config, fold.sha256, fold.fold)
             if fold.problem:
                 self._fail(task, fold.problem)
             else:
@@ -237,11 +241,11 @@ class FleetRun:
             for future in as_completed(list(waiting)):
                 task = waiting.pop(future)
                 try:
-                    found = future.result()
+                    report = future.result()
                 except Exception as error:
                     self._fail(task, self._reason(error, "it was replayed"))
                 else:
-                    self.done[found.drive] = found
+                    self.done[report.drive] = report
                 self.show("replaying")
         finally:
             for future in waiting:
@@ -265,7 +269,7 @@ class FleetRun:
         return " ".join(f"{type(error).__name__}: {error}".split())
 
     def _fail(self, task: DriveTask, reason: str) -> None:
-        made = failed(task, reason)
+        made = mark_failed(task, reason)
         with ending_the_run(self.folder):
             made.write(self.folder)
-        self.done[made.drive] = done(self.folder, made)
+        self.done[made.drive] = report_drive(self.folder, made)

@@ -20,12 +20,12 @@ import numpy as np
 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import FleetSettings, OutputSettings
-from roadeval.data import BASELINE, ERRORS, Frame, FrameResult
+from roadeval.data import ERRORS, Frame, FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import TESTED
 from roadeval.fleet.drives import DriveEntry, FleetError
 from roadeval.fleet.remote import stamp
-from roadeval.jobs.run.prepared import asked, software
+from roadeval.jobs.run.prepared import settings_digest, software
 from roadeval.jobs.run.replay import replay
 from roadeval.jobs.run.train import draw
 from roadeval.logs.truth.labels import label_files
@@ -47,9 +47,10 @@ from roadeval.results.fleet import (
 )
 from roadeval.results.rows import drive_row
 from roadeval.results.schema import FAILED
+from roadeval.results.verdict import focus_of
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, own_names, put, sha256_of
+from roadeval.runtime.files import alone, find_partial, put, sha256_of
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import save_model
@@ -80,7 +81,7 @@ class DriveTask:
     @property
     def asked(self) -> str:
         """Digest of settings, software and model."""
-        return asked(self.config, self.model, self.fold)
+        return settings_digest(self.config, self.model, self.fold)
 
     @property
     def record(self) -> str:
@@ -108,30 +109,30 @@ def replay_drive(task: DriveTask) -> Done:
     fleet's disk fails, or the worker has other software: any problem of the drive itself is told
     in `Done`.
     """
-    _check(task.software, task.config)
+    _check_software(task.software, task.config)
     model = task.config.training.model
     if task.model and sha256_of(Path(model or "")) != task.model:
         raise FleetError(f"{model}: has changed since the command began; give it again")
     with ending_the_run(task.folder), alone(made_path(task.folder, task.entry.id)):
-        made, repeated = valid(task), True
+        made, repeated = find_valid(task), True
         if made is None:
-            made, repeated = _made(task), False
+            made, repeated = _try_replay(task), False
             made.write(task.folder)
-        return done(task.folder, made, repeated=repeated)
+        return report_drive(task.folder, made, repeated=repeated)
 
 
-def valid(task: DriveTask) -> Made | None:
+def find_valid(task: DriveTask) -> Made | None:
     """Return how a drive was made that needs not be replayed: it is whole, nothing has changed."""
     made = read_made(task.folder, task.entry.id)
     if made is None or made.problem or made.asked != task.asked:
         return None
     if task.record != "none" and not recording_path(task.folder, made.drive).exists():
         return None
-    now = seen(task.entry, task.config)
+    now = stamp_files(task.entry, task.config)
     return made if now is not None and made.stamp == now else None
 
 
-def done(folder: Path, made: Made, *, repeated: bool = False) -> Done:
+def report_drive(folder: Path, made: Made, *, repeated: bool = False) -> Done:
     """Return what the fleet's command is told of a drive."""
     if made.problem:
         return Done(made.drive, FAILED, made.problem, made.asked, repeated)
@@ -139,41 +140,41 @@ def done(folder: Path, made: Made, *, repeated: bool = False) -> Done:
     return Done(made.drive, row["status"], row["reason"] or "", made.asked, repeated)
 
 
-def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
+def mark_failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
     """Return that a drive could not be used, and why; what replays have left of it goes."""
     _remove(task, RESULTS, PICTURES, RECORDINGS, *CACHED)
-    stamp = seen(task.entry, task.config)
+    stamp = stamp_files(task.entry, task.config)
     how = task.fold, task.model or None
     return Made(task.entry.id, task.asked, stamp, *how, problem=reason, exit_code=exit_code)
 
 
-def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
+def stamp_files(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
     """Return what shows at little cost that a drive's log, or masks beside it, did not change.
 
     Plain data by file: size and times, or of a URL size and tag. None where it cannot be looked at:
     the error is reported where it is read.
     """
-    beside = [own for own in (config.truth, *config.masks.values()) if own.path]
+    beside = [labels for labels in (config.truth, *config.masks.values()) if labels.path]
     try:
-        files = [file for own in beside for file in label_files(own)]
-        found: dict[str, Any] = {}
+        files = [file for labels in beside for file in label_files(labels)]
+        stamps: dict[str, Any] = {}
         if entry.path is None:
             size, tag = stamp(entry.source, config.run.patience_s)
             # Without a tag nothing shows: it is equal to no other.
-            found[entry.id] = [size, tag or secrets.token_hex()]
+            stamps[entry.id] = [size, tag or secrets.token_hex()]
         else:
             files += sorted(entry.path.iterdir()) if entry.path.is_dir() else [entry.path]
         facts = {str(file): file.stat() for file in files}
-        return found | {n: [f.st_size, f.st_mtime_ns, f.st_ctime_ns] for n, f in facts.items()}
+        return stamps | {n: [f.st_size, f.st_mtime_ns, f.st_ctime_ns] for n, f in facts.items()}
     except (OSError, RoadevalError):
         return None
 
 
-def _check(asking: Mapping[str, str], config: RunConfig) -> None:
+def _check_software(asking: Mapping[str, str], config: RunConfig) -> None:
     """Raise a FleetError if a worker's software is not that of the command."""
-    own = software(config)
-    for name in sorted(asking.keys() | own.keys()):
-        mine, theirs = own.get(name, "none"), asking.get(name, "none")
+    installed = software(config)
+    for name in sorted(asking.keys() | installed.keys()):
+        mine, theirs = installed.get(name, "none"), asking.get(name, "none")
         if mine != theirs:
             raise FleetError(
                 f"a worker has {name} {mine[:12]}, and the command {theirs[:12]}: install the same "
@@ -181,18 +182,20 @@ def _check(asking: Mapping[str, str], config: RunConfig) -> None:
             )
 
 
-def _made(task: DriveTask) -> Made:
+def _try_replay(task: DriveTask) -> Made:
     """Replay a drive; whatever is wrong with it is in what is returned."""
-    stamp, started = seen(task.entry, task.config), time.perf_counter()
+    stamp, started = stamp_files(task.entry, task.config), time.perf_counter()
     try:
         _replay(task)
     except Exception as error:
         if _disk_failure(error):
             raise
-        known = isinstance(error, RoadevalError) or memory.is_lacking(error)
-        said = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
-        reason = said if known else f"{type(error).__name__}: {said} (a defect of roadeval)"
-        return failed(task, reason, 1 if known else 70)
+        is_known = isinstance(error, RoadevalError) or memory.is_lacking(error)
+        message = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
+        reason = (
+            message if is_known else f"{type(error).__name__}: {message} (a defect of roadeval)"
+        )
+        return mark_failed(task, reason, 1 if is_known else 70)
     seconds = time.perf_counter() - started
     return Made(task.entry.id, task.asked, stamp, task.fold, task.model or None, seconds=seconds)
 
@@ -227,8 +230,9 @@ def _remove(task: DriveTask, *folders: str) -> None:
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
     }
-    partial = own_names(recording, hidden=False) if recording.parent.exists() else []
-    for path in (*(paths[each] for each in folders), *(partial if RECORDINGS in folders else ())):
+    partial = find_partial(recording, hidden=False) if recording.parent.exists() else []
+    chosen = [paths[name] for name in folders]
+    for path in (*chosen, *(partial if RECORDINGS in folders else ())):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         else:
@@ -302,29 +306,30 @@ def train_fold(task: FoldTask) -> FoldModel:
     A drive without truth, or one that cannot be used, is passed by, and the next one is asked. A
     `FleetError` if the fleet's disk fails, or the worker has other software.
     """
-    _check(task.software, task.config)
+    _check_software(task.software, task.config)
     about = task.path.with_suffix(".json")
     with ending_the_run(task.folder), alone(task.path, about):
-        looks = [seen(entry, own.for_training()) for entry, own in task.candidates]
-        parts = [asked(task.config, ""), looks]
-        parts += [[entry.id, asked(own, "")] for entry, own in task.candidates]
-        wanted = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
-        return _trained_before(task, about, wanted) or _trained(task, about, wanted)
+        looks = [stamp_files(entry, config.for_training()) for entry, config in task.candidates]
+        parts = [settings_digest(task.config, ""), looks]
+        parts += [[entry.id, settings_digest(config, "")] for entry, config in task.candidates]
+        digest = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
+        return _find_trained(task, about, digest) or _train_model(task, about, digest)
 
 
-def _trained_before(task: FoldTask, about: Path, wanted: str) -> FoldModel | None:
+def _find_trained(task: FoldTask, about: Path, asked_digest: str) -> FoldModel | None:
     try:
-        told = read_json(read_bounded(about))
+        about_model = read_json(read_bounded(about))
         digest = sha256_of(task.path)
     except (OSError, ValueError):
         return None
-    if not isinstance(told, dict) or (told.get("asked"), told.get("sha256")) != (wanted, digest):
+    as_asked = {"asked": asked_digest, "sha256": digest}
+    if not isinstance(about_model, dict) or not as_asked.items() <= about_model.items():
         return None
     return FoldModel(task.fold, digest)
 
 
-def _trained(task: FoldTask, about: Path, wanted: str) -> FoldModel:
-    drawn, passed = _drawn(task)
+def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
+    drawn, passed = _draw_frames(task)
     if not drawn:
         why = f": {min(passed.values())}" if passed else ""
         return FoldModel(
@@ -339,28 +344,28 @@ def _trained(task: FoldTask, about: Path, wanted: str) -> FoldModel:
         return FoldModel(task.fold, "", str(error))
     save_model(model, task.path)
     digest = sha256_of(task.path)
-    told = {
+    about_model = {
         "fold": task.fold,
-        "asked": wanted,
+        "asked": asked_digest,
         "sha256": digest,
         "drives": {path.name: len(frames) for path, frames in drawn.items()},
         "passed_by": passed,
         "training_frames": sorted(model.digests),
     }
-    put(about, json_text(told).encode())
+    put(about, json_text(about_model).encode())
     return FoldModel(task.fold, digest)
 
 
-def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]:
+def _draw_frames(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]:
     """Return the training frames of as many drives as are wanted, and why others gave none."""
     held = HeldFrames()
     drawn: dict[Path, Sequence[Frame]] = {}
     passed: dict[str, str] = {}
-    for entry, own in task.candidates:
+    for entry, config in task.candidates:
         if len(drawn) == TRAINING_DRIVES:
             break
         try:
-            frames, _ = draw(entry, own, held, labelled=True)
+            frames, _ = draw(entry, config, held, labelled=True)
         except RoadevalError as error:
             if _disk_failure(error):
                 raise
@@ -382,7 +387,7 @@ WIDTH: Final = 320
 
 
 class WorstPictures:
-    """Keeps pictures of the worst frames of a drive, by the first variant's final mask."""
+    """Keeps pictures of the worst frames of a drive, by the final mask of its focus."""
 
     def __init__(self) -> None:
         self._worst: list[tuple[float, int, int, bytes]] = []
@@ -396,18 +401,18 @@ class WorstPictures:
     def offer(self, result: FrameResult) -> None:
         """Keep a frame as long as it is one of the worst; one without a rate is ignored."""
         frame = result.frame
-        variant = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
+        variant = focus_of(tally.variant for tally in result.tallies)
         errors = [t.rates[TESTED] for t in result.tallies if t.variant == variant]
         if variant is None or math.isnan(error := errors[-1]):
             return
-        near = [kept for kept in self._worst if abs(kept[2] - frame.stamp_ns) < APART_NS]
-        rest = [kept for kept in self._worst if kept not in near]
+        near = [rival for rival in self._worst if abs(rival[2] - frame.stamp_ns) < APART_NS]
+        rest = [rival for rival in self._worst if rival not in near]
         rivals = [*near, *(rest[-1:] if len(rest) == WORST else [])]
-        if any(rival >= error for rival, *_ in rivals):
+        if any(rival[0] >= error for rival in rivals):
             return
         # Painted when they are small: most are soon replaced by a worse frame's.
         image, errors_of = shrink(frame.image, WIDTH), result.errors[variant].array
         small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
         ranked = [*rest, (error, frame.number, frame.stamp_ns, picture)]
-        self._worst = sorted(ranked, key=lambda kept: (-kept[0], kept[1]))[:WORST]
+        self._worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:WORST]

@@ -29,7 +29,7 @@ from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.logs.errors import FrameError
-from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, in_step
+from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, merge_streams
 from roadeval.logs.log import Log
 from roadeval.logs.truth.names import NamedLabels
 from roadeval.logs.truth.picks import Picks
@@ -84,22 +84,24 @@ class Failures:
     def add(self, failure: Failure) -> None:
         """Note a frame; its traceback is kept where it is among the first that differ."""
         error = failure.variant, _NUMBER.sub("", failure.reason)
-        own = self.by_error.setdefault(error, [])
-        kept = not own and len(self.by_error) <= KEPT
-        own.append(failure if kept else replace(failure, traceback=""))
+        failures = self.by_error.setdefault(error, [])
+        with_traceback = not failures and len(self.by_error) <= KEPT
+        failures.append(failure if with_traceback else replace(failure, traceback=""))
         if self.first is not None and failure.role in TRIED:
             self.first.append(failure)
 
     def tracebacks(self) -> tuple[str, ...]:
         """Return where in their code stages failed, for the first few errors."""
-        return tuple(own[0].traceback for own in self.by_error.values() if own[0].traceback)
+        return tuple(
+            failures[0].traceback for failures in self.by_error.values() if failures[0].traceback
+        )
 
     def sentences(self) -> Iterator[str]:
         """Yield a sentence for each error: the frames, the variant, the stage and why."""
-        for own in self.by_error.values():
-            frames = first_of([str(each.frame) for each in own], KEPT)
-            where = f"{len(own)} frames ({frames})" if len(own) > 1 else f"frame {frames}"
-            yield f"{where}: variant {own[0].variant}: {own[0].reason}"
+        for failures in self.by_error.values():
+            frames = first_of([str(failure.frame) for failure in failures], KEPT)
+            where = f"{len(failures)} frames ({frames})" if len(failures) > 1 else f"frame {frames}"
+            yield f"{where}: variant {failures[0].variant}: {failures[0].reason}"
 
 
 SPARSE: Final = 5
@@ -143,20 +145,22 @@ class Run:
     @property
     def calibration(self) -> Calibration | None:
         """The camera's calibration, for frames as they are read."""
-        known, size = self.selection.calibration, self.selection.size
+        calibration, size = self.selection.calibration, self.selection.size
         if (ground := self.selection.ground_as_read) and ground.is_posed:
-            frame = known.frame_id if known else self.key.camera.strip("/")
-            topic, mounting = (known.topic, known.mounting) if known else ("", None)
+            frame = calibration.frame_id if calibration else self.key.camera.strip("/")
+            topic, mounting = (
+                (calibration.topic, calibration.mounting) if calibration else ("", None)
+            )
             lens = ground.width, ground.height, ground.matrix, ground.model, ground.distortion
             return Calibration(topic, *lens, frame, mounting)
-        return known.scaled(*size) if known and size else None
+        return calibration.scaled(*size) if calibration and size else None
 
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
         """Add a frame, in the camera's order; return it with the lines that take that order."""
         doubts = self.board.add(done.result)
         frame, variants = done.result.frame, done.result.variants
-        own = [[*v.masks()][-1][1] for v in variants if v.variant not in frame.external]
-        self.fit.add(frame, own)
+        final_masks = [[*v.masks()][-1][1] for v in variants if v.variant not in frame.external]
+        self.fit.add(frame, final_masks)
         if done.result.role in TRIED:
             self.failures.first = None
         lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
@@ -180,7 +184,7 @@ class Run:
             calibration=self.calibration,
             ground=self.selection.ground_as_read,
             extent=(*self.config.evaluation.plan, self.config.evaluation.plan_width),
-            clouds=tuple(each.name for each in self.log.topics if each.is_cloud),
+            clouds=tuple(topic.name for topic in self.log.topics if topic.is_cloud),
             header_time=FOXGLOVE_TIME if of_foxglove else HEADER_TIME,
             tables={name: TABLES[name].header for name in STREAMED},
             properties={
@@ -228,10 +232,10 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     trim()
     masks = selection.masks
     layouts = (
-        *(each.layout() for each in variants),
+        *(variant.layout() for variant in variants),
         *(
-            external_layout(name, own.where, probable=own.is_confidence)
-            for name, own in masks.items()
+            external_layout(name, source.where, probable=source.is_confidence)
+            for name, source in masks.items()
             if name not in chains
         ),
     )
@@ -249,7 +253,7 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
         schedule,
         chains,
         layouts,
-        {each.name: told for each in variants if (told := each.pipeline.about())},
+        {variant.name: about for variant in variants if (about := variant.pipeline.about())},
         board,
         FitCheck(selection.among_truth(stream.numbers), config.frames.every),
         camera,
@@ -302,7 +306,7 @@ def computing() -> dict[str, str]:
     """Return the versions of the packages that compute."""
     import cv2
 
-    return {"opencv": cv2.__version__, **{each: version(each) for each in COMPUTING}}
+    return {"opencv": cv2.__version__, **{package: version(package) for package in COMPUTING}}
 
 
 def software(config: RunConfig) -> dict[str, str]:
@@ -323,12 +327,15 @@ def identity(log: Log, config: RunConfig, masks: Mapping[str, str] | None = None
     fails.
     """
     model = config.training.model
-    return asked(config, sha256_of(Path(model)) if model else "", log.digest, masks or {})
+    return settings_digest(config, sha256_of(Path(model)) if model else "", log.digest, masks or {})
 
 
-def asked(config: RunConfig, model: str, *more: Any) -> str:
+def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
     """Return a digest of settings, software, the SHA-256 of a model, and more, in hexadecimal."""
-    masks = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
+    masks = {
+        name: replace(mask_settings, path="", images=None)
+        for name, mask_settings in config.masks.items()
+    }
     truth = replace(config.truth, path="", images=None)
     nowhere = "" if config.training.adapt else None  # wherever the file lies
     training = replace(config.training, model=nowhere)
@@ -370,7 +377,7 @@ def process(
 
     def numbered() -> Iterator[tuple[Run, int, LoggedFrame]]:
         """Yield the frames, each with its position among its camera's."""
-        for place, logged in in_step([run.frames for run in runs]):
+        for place, logged in merge_streams([run.frames for run in runs]):
             read[place] += 1
             yield runs[place], read[place], logged
 
@@ -390,13 +397,13 @@ def process(
                 break
     for run in runs:
         if first := run.failures.first:
-            raise _hopeless(run, first) from StageError(first[0].traceback)
+            raise _hopeless_error(run, first) from StageError(first[0].traceback)
 
 
-def _hopeless(run: Run, failures: Sequence[Failure]) -> StageError:
+def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
     """Return the error that ends a run in which the first frames failed, or all."""
     first, last = failures[0], failures[-1]
-    others = [f"`only` {each.name}" for each in run.layouts if each.name != first.variant]
+    others = [f"`only` {layout.name}" for layout in run.layouts if layout.name != first.variant]
     left_out = f", or leave the variant out with {' '.join(others)}" if others else ""
     return StageError(
         f"variant {first.variant}: {first.reason}, on each of the first {len(failures)} frames "
@@ -415,20 +422,20 @@ def _process(
     role = run.schedule.role(frame)
     if role is Role.UNLABELLED and frame.truth is not None:
         frame = replace(frame, truth=None)  # it is a proposal as it was made
-    known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
+    truths_known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of_frame(frame)
     variants = []
     for name, chain in run.chains.items():
-        truths = {"truth": known[0], "shadow_truth": known[1]}
+        truths = {"truth": truths_known[0], "shadow_truth": truths_known[1]}
         try:
-            found = run_variant(name, chain, view, **truths, known=shared)
+            variant_result = run_variant(name, chain, view, **truths, known=shared)
         except AbsentError:
             continue
         except StageError as error:
             where = "".join(traceback.format_exception(error))
             return run, Failure(frame.number, role, name, str(error), where)
-        variants.append(found)
+        variants.append(variant_result)
     variants += [
         external_variant(name, mask, frame.probabilities.get(name))
         for name, mask in frame.external.items()
@@ -436,7 +443,7 @@ def _process(
     ]
     result = run.board.score(frame, role, tuple(variants))
     result = replace(result, notes=notes_of(result.tallies))
-    own = csv_lines(run.key, frame_rows(result))
+    lines = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
-    return run, ProcessedFrame(position, result.without_layers(), own, encoded)
+    return run, ProcessedFrame(position, result.without_layers(), lines, encoded)

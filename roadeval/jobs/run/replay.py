@@ -89,27 +89,27 @@ def replay(
     RoadevalError
         For whatever a user can mend: one line with what is wrong, where, and what to do.
     """
-    given = {"save": save, "reports": reports, "mcap": mcap}
-    wanted = {name: str(path) for name, path in given.items() if path is not None}
-    config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
+    places = {"save": save, "reports": reports, "mcap": mcap}
+    places_given = {name: str(path) for name, path in places.items() if path is not None}
+    config = (config or RunConfig()).for_drive(drive).override({"output": places_given}).resolved()
     with open_log(readable(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
-            outcome = _written(log, config, to, on_progress, on_frame)
+            outcome = _replay_log(log, config, to, on_progress, on_frame)
             if to.recording is None and (save := config.output.save) is not None:
                 unwritten = f"`output.save` {save} is not written: `output.record` is none"
                 return replace(outcome, warnings=(*outcome.warnings, unwritten))
             return outcome
 
 
-def _written(
+def _replay_log(
     log: Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
 ) -> Outcome:
     """Run over the log. All outputs are whole before the first of them takes its name."""
     cameras = config.by_camera()
     runs = [
-        prepare(log.for_camera(own) if name else log, own, on_progress, name)
-        for name, own in cameras.items()
+        prepare(log.for_camera(camera_config) if name else log, camera_config, on_progress, name)
+        for name, camera_config in cameras.items()
     ]
     layouts = {run.camera: run.layout() for run in runs}
     rule = RecordRule.parse(config.output.record)
@@ -118,11 +118,11 @@ def _written(
         recorder_for(to.recording, layouts, rule) as recorder,
         ResultsWriter(to.reports) as results,
     ):
-        drawn = _record(
+        drawn = _record_frames(
             runs, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
         )
-        ended = [_ended(run, results, drawn[run.camera]) for run in runs]
-        facts = _finished(runs, ended, recorder, results, config)
+        ended = [_sum_up(run, results, drawn[run.camera]) for run in runs]
+        facts = _finish_recording(runs, ended, recorder, results, config)
         sidecar.finish()
         tracebacks = tuple(text for run in runs for text in run.failures.tracebacks())
         del runs  # figures take the room of its frames and models
@@ -130,10 +130,10 @@ def _written(
         if config.output.figures:
             from roadeval.report.figures import write_figures
 
-            with results.explained():
+            with results.explain_errors():
                 names = short_names([*cameras])
-                for camera, own in zip(cameras, ended, strict=True):
-                    windows, shown = own.sums.windows, drawn[camera]
+                for camera, end in zip(cameras, ended, strict=True):
+                    windows, shown = end.sums.windows, drawn[camera]
                     write_figures(results.folder, log.name, windows, shown, names[camera])
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
@@ -146,7 +146,7 @@ def _written(
 
 
 @dataclass(frozen=True, eq=False)
-class _Ended:
+class _CameraResult:
     """What a camera's run has found."""
 
     facts: Facts
@@ -156,19 +156,19 @@ class _Ended:
     metres: tuple[Mapping[str, Any], ...]
 
 
-def _ended(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _Ended:
+def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _CameraResult:
     """Sum up a camera's run, and add the sums to the tables."""
     sums = run.board.summary()
     lines = csv_lines(run.key, sum_rows(run.board, sums.windows))
     results.append(lines)
     shown = [example.frame for example in examples]
-    facts = summary.of(run, sums, shown, {} if run.camera else results.tables)
-    return _Ended(facts, sums, _texts(run, facts, lines), tuple(run.board.metres()))
+    facts = summary.make_facts(run, sums, shown, {} if run.camera else results.tables)
+    return _CameraResult(facts, sums, _recorded_texts(run, facts, lines), tuple(run.board.metres()))
 
 
-def _finished(
+def _finish_recording(
     runs: Sequence[Run],
-    ended: Sequence[_Ended],
+    ended: Sequence[_CameraResult],
     recorder: Recorder | NullRecorder,
     results: ResultsWriter,
     config: RunConfig,
@@ -177,19 +177,20 @@ def _finished(
     if len(runs) == 1:
         recorder.finish(ended[0].texts)
         return ended[0].facts
-    found = {run.camera: own.facts for run, own in zip(runs, ended, strict=True)}
-    frames = joined([own.sums.frames for own in ended])
-    facts = summary.of_cameras(frames, found, results.tables)
-    # The seconds differ from run to run, see `_texts`.
-    steady = {name: replace(each, seconds={}) for name, each in found.items()}
-    kept = replace(facts, run=deciding(config).as_dict(), cameras=steady)
+    by_camera = {run.camera: end for run, end in zip(runs, ended, strict=True)}
+    frames = joined([end.sums.frames for end in ended])
+    camera_facts = {name: end.facts for name, end in by_camera.items()}
+    facts = summary.join_cameras(frames, camera_facts, results.tables)
+    # The seconds differ from run to run, see `_recorded_texts`.
+    steady = {name: replace(facts, seconds={}) for name, facts in camera_facts.items()}
+    recorded = replace(facts, run=deciding(config).as_dict(), cameras=steady)
     toml = run_toml(deciding(config), facts.drive.name, VERSION)
-    by_camera = {run.camera: own.texts for run, own in zip(runs, ended, strict=True)}
-    recorder.finish({"summary": kept.text(), "run": toml}, by_camera=by_camera)
+    texts = {name: end.texts for name, end in by_camera.items()}
+    recorder.finish({"summary": recorded.text(), "run": toml}, by_camera=texts)
     return facts
 
 
-def _record(
+def _record_frames(
     runs: Sequence[Run],
     recorder: Recorder | NullRecorder,
     results: ResultsWriter,
@@ -212,10 +213,10 @@ def _record(
     on_progress(Progress(total, total, "writing"))
     recorder.flush()
     trim()
-    return {camera: each.kept for camera, each in examples.items()}
+    return {camera: camera_examples.kept for camera, camera_examples in examples.items()}
 
 
-def _texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:
+def _recorded_texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:
     """Return the results as the recording keeps them: the files' own text.
 
     What decides no number is left out, so that the same input gives the same recording.

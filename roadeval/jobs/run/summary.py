@@ -38,8 +38,9 @@ from roadeval.results.facts import (
     TrainingFacts,
     UnlabelledFacts,
 )
-from roadeval.results.sentences import misfit, verdict
+from roadeval.results.sentences import misfit
 from roadeval.results.tables import TableFacts
+from roadeval.results.verdict import verdict
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -54,27 +55,27 @@ RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
-def of(run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFacts]) -> Facts:
+def make_facts(
+    run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFacts]
+) -> Facts:
     """Return the facts of a run at its end, with the frames of figure 2.
 
     ``stated`` are rows and checksums of the tables.
     """
-    found, effects = sums.parts, sums.effects
+    parts, effects = sums.parts, sums.effects
     settings = run.config.training
-    given = settings.model is not None and not settings.adapt
-    unlabelled, estimated = _unlabelled(run.board.unlabelled), _estimate(run, sums.frames)
-    thresholds = dict(_thresholds(run))
+    is_given = settings.model is not None and not settings.adapt
+    unlabelled = _unlabelled_facts(run.board.unlabelled)
+    estimated = _estimate_rates(run, sums.frames)
+    thresholds = dict(_best_thresholds(run))
     varying = ["The images' sizes vary."] if run.frames.accounting.odd_sizes else []
-    misfits = [*_misfits(run)]
-    said = verdict(
-        *(found["totals"], effects, found["claims"], thresholds),
-        unlabelled=unlabelled,
-        estimated=estimated,
-    )
+    misfits = [*_misfit_sentences(run)]
+    totals = parts["totals"]
+    told = verdict(totals, effects, thresholds, unlabelled=unlabelled, estimated=estimated)
     return Facts(
-        **found,
+        **parts,
         effects=[*effects],
-        verdict=" ".join([*misfits, said, *varying]),
+        verdict=" ".join([*misfits, told, *varying]),
         misfits=misfits,
         unlabelled=unlabelled,
         estimate=estimated,
@@ -89,29 +90,29 @@ def of(run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFa
             calibration=run.calibration,
             ground=run.selection.ground_as_read,
         ),
-        frames=_accounting(run),
+        frames=_account_for_frames(run),
         examples=examples,
         training=TrainingFacts(
             run.model.source,
             len(run.model.digests),
             run.model.pixels,
             settings.model,
-            None if given else "picked" if run.schedule.picks else settings.placement,
+            None if is_given else "picked" if run.schedule.picks else settings.placement,
             settings.adapt,
         ),
-        warnings=list(warnings(run, found["totals"])),
+        warnings=list(warnings(run, totals)),
         losses=list(losses(run)),
         run=run.config.as_dict(),
-        settings={each.name: each.pipeline.as_dict() for each in run.variants},
+        settings={variant.name: variant.pipeline.as_dict() for variant in run.variants},
         methods=run.methods,
         versions=versions(),
         log=LogFacts(run.log.source, run.log.digest),
-        masks=_masks(run),
+        masks=_mask_facts(run),
         tables=stated,
     )
 
 
-def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
+def _unlabelled_facts(frames: Unlabelled) -> UnlabelledFacts | None:
     """Return which frames without truth to look at, by the first variant."""
     rows = frames.rows()
     if not len(rows):
@@ -125,31 +126,31 @@ def _unlabelled(frames: Unlabelled) -> UnlabelledFacts | None:
     return UnlabelledFacts(len(rows), first, sign, look_at, differing)
 
 
-def _estimate(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
+def _estimate_rates(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
     """Estimate the final masks' rates on the whole drive, from frames that were drawn at random."""
     picks = run.schedule.picks
     if picks is None:
         return None
     every, confidence = picks.every_score(), run.config.evaluation.confidence
     rates: dict[str, dict[str, Estimate]] = {}
-    problem = _not_random(run, picks)
+    problem = _why_not_random(run, picks)
     finals = tables.finals(frames.iloc[:0] if problem else frames)
-    for (variant,), rows in tables.grouped(finals, ["variant"]):
+    for (variant,), rows in tables.group_rows(finals, ["variant"]):
         for rate in (rate for rate in METRICS if rate in SHORT):
-            known = rows[rows[rate].notna()]
-            if len(known):
-                scores = every[[picks.places[float(stamp)] for stamp in known["stamp_ns"]]]
-                values = known[rate].to_numpy()
+            defined = rows[rows[rate].notna()]
+            if len(defined):
+                scores = every[[picks.places[float(stamp)] for stamp in defined["stamp_ns"]]]
+                values = defined[rate].to_numpy()
                 rates.setdefault(variant, {})[rate] = estimate(values, scores, every, confidence)
     apart: dict[str, dict[str, float | None]] = {
-        str(frame): dict(own) for frame, own in run.board.apart.items()
+        str(frame): dict(rates_apart) for frame, rates_apart in run.board.apart.items()
     }
     labels = frames["frame"].nunique()
     chance = picks.drawn / len(every)
     return EstimateFacts(len(every), picks.drawn, labels, chance, rates, apart, problem)
 
 
-def _not_random(run: Run, picks: Picks) -> str:
+def _why_not_random(run: Run, picks: Picks) -> str:
     """Return why the labelled frames are no random part of the drive; empty if they are."""
     if picks.log != run.log.digest:
         return "the log is not as it was when its frames were picked: pick again, into a new folder"
@@ -159,10 +160,10 @@ def _not_random(run: Run, picks: Picks) -> str:
     return ""
 
 
-def _misfits(run: Run) -> Iterator[str]:
+def _misfit_sentences(run: Run) -> Iterator[str]:
     """Yield what of truth and masks does not fit the images, and what to do about it."""
     for finding in run.fit.findings():
-        yield misfit_in_words(finding, run.selection, run.config)
+        yield misfit_sentence(finding, run.selection, run.config)
 
 
 def misfits_of_truth(log: Log) -> Iterator[str]:
@@ -177,14 +178,14 @@ def misfits_of_truth(log: Log) -> Iterator[str]:
         with suppress(FrameError):
             fit.add(logged.decode())
     for finding in fit.findings():
-        yield misfit_in_words(finding, selection, log.config)
+        yield misfit_sentence(finding, selection, log.config)
 
 
 def _around(number: int, stride: int) -> range:
     return range(number - LAST_LAG * stride, number + LAST_LAG * stride + 1, stride)
 
 
-def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -> str:
+def misfit_sentence(finding: Finding, selection: Selection, config: LogConfig) -> str:
     """Return what of truth or masks does not fit the images, and what to do about it."""
     rate, is_truth = selection.image.rate_hz, finding.subject == TRUTH
     period_ms = 1000 / rate if rate else None
@@ -206,58 +207,58 @@ def misfit_in_words(finding: Finding, selection: Selection, config: LogConfig) -
     return misfit(finding, period_ms, remedy)
 
 
-def _thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
+def _best_thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield what the threshold of the training frames would bring to methods that learn nothing."""
-    found = run.board.thresholds()
-    masks = [(name, each.threshold) for name, each in run.config.masks.items()]
-    own = {name: at for name, at in masks if at is not None and name not in run.chains}
+    best = run.board.thresholds()
+    masks = [(name, mask.threshold) for name, mask in run.config.masks.items()]
+    lines_of = {name: at for name, at in masks if at is not None and name not in run.chains}
     # Five digits tell codes apart; road is what exceeds a code, but what reaches masks' threshold.
-    lines = dict.fromkeys(own, ("threshold = {:.5f}", 0.5 / CERTAIN))
+    lines = dict.fromkeys(lines_of, ("threshold = {:.5f}", 0.5 / CERTAIN))
     for variant in run.variants:
         stages = variant.pipeline.settings
         post = stages[FINAL_STAGE]
         is_final = all(getattr(post, key) == value for key, value in AS_IT_IS.items())
         if is_final and not variant.pipeline.learning():
             net = stages.get("net")
-            own[variant.name] = 0.5
+            lines_of[variant.name] = 0.5
             if net is not None and net.threshold is not None:
-                own[variant.name] = net.threshold
+                lines_of[variant.name] = net.threshold
                 decided = 'decide = "argmax"\n' * (net.decide == "argmax")
                 lines[variant.name] = (f"{decided}threshold = {{:.5f}}", 0)
-    for name, threshold in own.items():
+    for name, threshold in lines_of.items():
         line, more = lines.get(name, ("", 0))
-        for at in found.get(name, {}).values():
+        for at in best.get(name, {}).values():
             yield name, {"own": threshold, **at, "lines": line.format(at["threshold"] + more)}
 
 
-def of_cameras(
-    frames: pd.DataFrame, found: Mapping[str, Facts], stated: dict[str, TableFacts]
+def join_cameras(
+    frames: pd.DataFrame, cameras: Mapping[str, Facts], stated: dict[str, TableFacts]
 ) -> Facts:
     """Return the facts of a rig: of its cameras together, each of which counts the same."""
-    first, *_ = found.values()
+    first, *_ = cameras.values()
     by_camera = tables.totals(frames, ["camera", *tables.MASK])
     totals = tables.as_trees(tables.over_cameras(by_camera))
     effects = drive_effects(frames, first.evaluation)
-    misfits = [f"{name}: {text}" for name, own in found.items() for text in own.misfits]
-    claims: dict[str, dict[str, int]] = _added(each.claims for each in found.values())
-    accounts = [asdict(each.frames) for each in found.values()]
+    misfits = [f"{name}: {text}" for name, facts in cameras.items() for text in facts.misfits]
+    claims: dict[str, dict[str, int]] = _add_counts(facts.claims for facts in cameras.values())
+    accounts = [asdict(facts.frames) for facts in cameras.values()]
     skipped = Counter[str]()
     for account in accounts:
         skipped.update(account.pop("skipped"))
-    counted = {name: sum(each[name] or 0 for each in accounts) for name in accounts[0]}
+    counted = {name: sum(account[name] or 0 for account in accounts) for name in accounts[0]}
     return replace(
         first,
         effects=effects,
-        verdict=" ".join([*misfits, verdict(totals, effects, claims)]),
+        verdict=" ".join([*misfits, verdict(totals, effects)]),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
         totals=totals,
-        windows=sum(each.windows for each in found.values()),
+        windows=sum(facts.windows for facts in cameras.values()),
         claims=claims,
-        health=_added(each.health for each in found.values()),
-        warnings=[*_by_camera({name: each.warnings for name, each in found.items()})],
-        losses=[*_by_camera({name: each.losses for name, each in found.items()})],
+        health=_add_counts(facts.health for facts in cameras.values()),
+        warnings=[*_name_cameras({name: facts.warnings for name, facts in cameras.items()})],
+        losses=[*_name_cameras({name: facts.losses for name, facts in cameras.items()})],
         beyond={},
         curves={},
         thresholds={},
@@ -266,24 +267,26 @@ def of_cameras(
         examples=[],
         training=TrainingFacts(first.training.source, model=first.training.model),
         tables=stated,
-        cameras={**found},
+        cameras={**cameras},
     )
 
 
-def _added(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
+def _add_counts(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
     """Add up the cameras' counts, by two names each."""
     sums: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    for each in parts:
-        for name, counts in each.items():
+    for part in parts:
+        for name, counts in part.items():
             sums[name].update(counts)
     return {name: dict(counts) for name, counts in sums.items()}
 
 
-def _by_camera(found: Mapping[str, Sequence[str]]) -> Iterator[str]:
+def _name_cameras(sentences: Mapping[str, Sequence[str]]) -> Iterator[str]:
     """Yield the cameras' sentences: with the camera's name, but for what all say."""
-    common = [each for each in next(iter(found.values())) if all(each in s for s in found.values())]
+    first, *others = sentences.values()
+    common = [sentence for sentence in first if all(sentence in other for other in others)]
     yield from common
-    yield from (f"{name}: {e}" for name, own in found.items() for e in own if e not in common)
+    for camera, of_camera in sentences.items():
+        yield from (f"{camera}: {sentence}" for sentence in of_camera if sentence not in common)
 
 
 def versions() -> dict[str, str]:
@@ -292,61 +295,63 @@ def versions() -> dict[str, str]:
     return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
 
-def warnings(run: Run, totals: Totals) -> tuple[str, ...]:
-    """List what a user should know before believing the results."""
-    missing = run.selection.no_truth
-    unlabelled = f"there is no road truth to score against, only masks to look at: {missing}"
-    warned = []
-    selection, prior = run.selection, run.model.prior
-    scale = run.config.frames.scale
+def warnings(run: Run, totals: Totals) -> Iterator[str]:
+    """Yield what a user should know before believing the results."""
+    if missing := run.selection.no_truth:
+        yield f"there is no road truth to score against, only masks to look at: {missing}"
+        yield from _ranking_warnings(run)
+    yield from _label_warnings(run)
+    yield from (str(damage) for damage in run.log.damage if not damage.lossy)
+    yield from (f"{run.selection.image.name}: {note}" for note in run.selection.notes)
+    yield from run.frames.accounting.notes
+    yield from _size_warnings(run)
+    yield from _network_warnings(run)
+    yield from _tuning_warnings(run)
+    yield from _mask_warnings(run, totals)
+    yield from _training_warnings(run)
+    yield from _pick_warnings(run)
+    yield from _constant_warnings(totals)
+    yield from run.model.warnings
+
+
+def _size_warnings(run: Run) -> Iterator[str]:
+    """Yield how the sizes of frames, and what metres rest on, limit the results."""
+    selection, prior, scale = run.selection, run.model.prior, run.config.frames.scale
     if scale != 1 and selection.image.size:
         width, height = selection.image.size
-        warned.append(
+        yield (
             f"the frames, {width}x{height} in the log, are reduced to "
             f"{scale:g} of it: the numbers are not those of full frames"
         )
     if run.config.training.model is not None and prior is not None and selection.size:
         width, height = selection.size
         if prior.shape != (height, width):
-            warned.append(
+            yield (
                 f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
     if selection.ground and (lens := selection.calibration) and selection.calibration_why:
-        warned.append(f"metres rest on {lens.topic}: {selection.calibration_why}")
-    return (
-        *((unlabelled, *_most_doubtful(run)) if missing else ()),
-        *_sparse(run),
-        *(str(damage) for damage in run.log.damage if not damage.lossy),
-        *(f"{run.selection.image.name}: {note}" for note in run.selection.notes),
-        *run.frames.accounting.notes,
-        *tuple(warned),
-        *_taken(run),
-        *_tuned(run),
-        *_missing(run, totals),
-        *_near_training(run),
-        *_of_picks(run),
-        *_constant(totals),
-        *run.model.warnings,
-    )
+        yield f"metres rest on {lens.topic}: {selection.calibration_why}"
 
 
-def _most_doubtful(run: Run) -> Iterator[str]:
+def _ranking_warnings(run: Run) -> Iterator[str]:
     """Yield by what ``worst:K`` ranked the frames of a log without truth."""
-    rule, found = run.config.output.record, _unlabelled(run.board.unlabelled)
-    if rule.startswith("worst:") and found:
-        kept = f"kept the frames that are most in doubt, by {found.sign} of {found.variant}"
-        if found.sign not in RANKS_AT_ONCE:
-            kept = "kept no pictures: one method alone says nothing by which a frame could rank"
-        yield f"without truth `output.record` {rule} {kept}"
+    rule, unlabelled = run.config.output.record, _unlabelled_facts(run.board.unlabelled)
+    if rule.startswith("worst:") and unlabelled:
+        pictures = (
+            f"kept the frames that are most in doubt, by {unlabelled.sign} of {unlabelled.variant}"
+        )
+        if unlabelled.sign not in RANKS_AT_ONCE:
+            pictures = "kept no pictures: one method alone says nothing by which a frame could rank"
+        yield f"without truth `output.record` {rule} {pictures}"
 
 
-def _of_picks(run: Run) -> Iterator[str]:
+def _pick_warnings(run: Run) -> Iterator[str]:
     """Yield how many picked frames are not labelled yet, and which labels were not picked."""
     picks, roles = run.schedule.picks, Counter(run.board.roles())
     if picks is None:
         return
-    if problem := _not_random(run, picks):
+    if problem := _why_not_random(run, picks):
         yield f"no number for the whole drive: {problem}"
     scored = roles[Role.EVALUATED]
     if (missing := picks.drawn - scored) > 0:
@@ -356,20 +361,20 @@ def _of_picks(run: Run) -> Iterator[str]:
             f"{missing} of the {picks.drawn} frames that were drawn at random have no label yet: "
             f"{rest}"
         )
-    known = {each.frame for each in picks.picked}
-    unread = len(known & run.frames.accounting.undecodable.keys())
+    picked = {frame.frame for frame in picks.picked}
+    unread = len(picked & run.frames.accounting.undecodable.keys())
     used = (Role.PICKED, *([Role.TRAINING, Role.COPY] if run.model.source == "truth" else []))
-    own = scored + sum(roles[each] for each in used)
-    if (unchanged := run.frames.accounting.labelled - own - unread) > 0:
+    counted = scored + sum(roles[role] for role in used)
+    if (unchanged := run.frames.accounting.labelled - counted - unread) > 0:
         yield (
             f"{unchanged} labels are as they were proposed, or ignored as a whole, and count as "
             f"not labelled; of one that is right as it is, empty `proposal` in {PICK}"
         )
-    if others := len(run.board.apart.keys() - known):
+    if others := len(run.board.apart.keys() - picked):
         yield f"{others} labels are of frames that were not picked: they are in no number"
 
 
-def _taken(run: Run) -> Iterator[str]:
+def _network_warnings(run: Run) -> Iterator[str]:
     """Yield which networks' outputs are taken for probabilities."""
     for name, stages in run.methods.items():
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
@@ -380,18 +385,18 @@ def _taken(run: Run) -> Iterator[str]:
             )
 
 
-def _tuned(run: Run) -> Iterator[str]:
+def _tuning_warnings(run: Run) -> Iterator[str]:
     """Yield for each method that was tuned where its trees have learnt."""
     settings, roles = run.config.training, Counter(run.board.roles())
     number = roles[Role.TRAINING]
     frames = "labelled frames" if run.model.source == "truth" else "frames, without labels"
     is_first = settings.placement == "first"
-    own = (
+    here = (
         f"this drive's first {number} {frames}" if is_first else f"{number} {frames} of this drive"
     )
-    where = own
+    where = here
     if settings.model is not None:
-        where = f"other drives and {own}" if settings.adapt else f"other drives ({settings.model})"
+        where = f"other drives and {here}" if settings.adapt else f"other drives ({settings.model})"
     for variant in run.variants:
         if "threshold" in variant.pipeline.settings:
             yield f"{variant.name}: its threshold is the one with the fewest errors on {where}"
@@ -403,7 +408,7 @@ def _tuned(run: Run) -> Iterator[str]:
             )
 
 
-def _sparse(run: Run) -> Iterator[str]:
+def _label_warnings(run: Run) -> Iterator[str]:
     """Yield what windows are of where only labelled frames are read, and whether none was."""
     if run.config.frames.labelled:
         yield (
@@ -424,7 +429,7 @@ def losses(run: Run) -> tuple[str, ...]:
     return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
 
 
-def _missing(run: Run, totals: Totals) -> Iterator[str]:
+def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield a warning where masks of other systems are missing, or belong to no frame."""
     seen = run.frames.accounting
     for name, masks in run.selection.labels.items():
@@ -444,36 +449,36 @@ def _missing(run: Run, totals: Totals) -> Iterator[str]:
     yield from run.frames.unpaired()
 
 
-def _masks(run: Run) -> dict[str, Any]:
+def _mask_facts(run: Run) -> dict[str, Any]:
     """State where labels lie that are not in the log, and how many frames have one."""
-    found, seen = {}, run.frames.accounting
+    masks, seen = {}, run.frames.accounting
     for name, digest in run.selection.digests().items():
         source = run.selection.masks.get(name, run.selection.truth)
         assert source is not None
-        found[name] = {
+        masks[name] = {
             "path": run.config.masks.get(name, run.config.truth).path,
             "digest": digest,
             "pairing": source.why,
             "meaning": source.meaning.words,
             "frames": seen.masks[name] if name in run.selection.masks else seen.labelled,
         }
-    return found
+    return masks
 
 
-def _near_training(run: Run) -> Iterator[str]:
+def _training_warnings(run: Run) -> Iterator[str]:
     """Warn where frames that trained a model file lie in this drive."""
     roles, trained = Counter(run.board.roles()), len(run.model.digests)
-    own, settings = roles[Role.TRAINING], run.config.training
+    of_this_drive, settings = roles[Role.TRAINING], run.config.training
     if settings.model is None or settings.adapt or not roles[Role.EVALUATED]:
         return
-    if own:
+    if of_this_drive:
         yield (
-            f"{own} of the model's {trained} training frames lie in this drive; their neighbours "
-            f"are evaluated and {FLATTERED}"
+            f"{of_this_drive} of the model's {trained} training frames lie in this drive; their "
+            f"neighbours are evaluated and {FLATTERED}"
         )
 
 
-def _constant(totals: Totals) -> Iterator[str]:
+def _constant_warnings(totals: Totals) -> Iterator[str]:
     """Warn of variants whose final mask is road nowhere, or everywhere."""
     for variant, stages in totals.items():
         *_, total = stages.values()
@@ -482,7 +487,7 @@ def _constant(totals: Totals) -> Iterator[str]:
                 yield f"{variant}: its final mask is road {where}, on every frame"
 
 
-def _accounting(run: Run) -> FrameAccount:
+def _account_for_frames(run: Run) -> FrameAccount:
     """Account for every frame of the image topic: evaluated, or skipped and why."""
     seen, roles = run.frames.accounting, Counter(run.board.roles())
     labelled, is_first = run.config.frames.labelled, run.config.training.placement == "first"

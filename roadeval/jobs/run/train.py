@@ -13,7 +13,7 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.logs.frames import FrameStream
 from roadeval.logs.log import open_log
-from roadeval.runtime.files import AnyPath, Paths, listed
+from roadeval.runtime.files import AnyPath, Paths, list_paths
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import Model, save_model
@@ -36,21 +36,21 @@ def train(
     is nothing to learn.
     """
     config = (config or RunConfig()).resolved()
-    settings, entries = config.training, find_drives([str(drive) for drive in listed(drives)])
+    settings, entries = config.training, find_drives([str(drive) for drive in list_paths(drives)])
     total = settings.frames * len(entries)
     held = HeldFrames(lambda count: on_progress(Progress(count, total, "training")))
-    with holding(output, inputs=[each.path for each in entries]):
+    with holding(output, inputs=[entry.path for entry in entries]):
         drawn = {
-            Path(f"{each.shown} {each.camera}".rstrip()): draw(each, each.config(config), held)
-            for each in entries
+            Path(f"{entry.shown} {entry.camera}".rstrip()): draw(entry, entry.config(config), held)
+            for entry in entries
         }
-        frames = {path: own for path, (own, _) in drawn.items()}
+        frames = {path: frames_of for path, (frames_of, _) in drawn.items()}
         model = learning.from_drives(frames, config.pipelines(), settings)
         losses = [
             sentence if len(drawn) == 1 or sentence.startswith(start) else f"{start}{sentence}"
-            for path, (_, own) in drawn.items()
+            for path, (_, frames_of) in drawn.items()
             for start in [f"{path.name}: "]
-            for sentence in own
+            for sentence in frames_of
         ]
         model = replace(model, losses=tuple(losses))
         save_model(model, Path(output))
@@ -58,14 +58,14 @@ def train(
 
 
 def draw(
-    drive: DriveEntry, own: RunConfig, held: HeldFrames, *, labelled: bool = False
+    drive: DriveEntry, config: RunConfig, held: HeldFrames, *, labelled: bool = False
 ) -> tuple[list[Frame], list[str]]:
     """Decode the training frames of a drive and hold them; return also what of it was lost.
 
     Where they must be ``labelled``, a drive without road truth gives none.
     """
     frames, streams = list[Frame](), list[FrameStream]()
-    with open_log(readable(drive.source, own.run.patience_s), own.for_training()) as log:
+    with open_log(readable(drive.source, config.run.patience_s), config.for_training()) as log:
         selection = log.select()
         if labelled and selection.truth is None:
             return [], []
@@ -74,8 +74,8 @@ def draw(
             streams.append(log.frames(selection))
             return streams[-1]
 
-        by_truth = labelled or own.training.source != "patch"
-        for frame in learning.spread(begin, own.training.frames, labelled=by_truth):
+        by_truth = labelled or config.training.source != "patch"
+        for frame in learning.decode_evenly(begin, config.training.frames, labelled=by_truth):
             if labelled and frame.truth is None:
                 return [], []
             held.add(frame)

@@ -1,4 +1,4 @@
-"""One MCAP log: its channels, where their messages lie, and what is damaged."""
+"""One MCAP log: its channels, the places of their messages, and its damage."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from roadeval.logs.container.records import (
+    BLOCK,
     BUFFER,
     IN_MEMORY,
     Entries,
@@ -28,14 +29,8 @@ from roadeval.logs.container.scan import Scan, StampOf, definitions, entries_of
 from roadeval.logs.errors import BadRecord
 from roadeval.logs.settings import NS
 
-BEGIN: Final = 4096
-"""Bytes of a chunk without a checksum that take part in a log's fingerprint."""
-BLOCK: Final = 1 << 20
-"""Bytes to take at a time of a whole file."""
 OUTSIDE: Final = -1
-"""The chunk number of a message that lies in no chunk."""
-TRIED: Final = 5
-"""Chunks with messages by which the right one of two descriptions is found."""
+"""The chunk number of messages outside chunks."""
 BEFORE_ALL: Final = int(np.iinfo(np.int64).min) + 1
 """A log time before all others."""
 
@@ -45,32 +40,31 @@ Wanted = Callable[[Channel, Schema | None], bool]
 
 @dataclass(slots=True)
 class ChannelLog:
-    """Where the messages of one channel lie."""
+    """The places of the messages of one channel."""
 
     wanted: bool
     count: int = 0
     first_ns: int = np.iinfo(np.int64).max
     last_ns: int = np.iinfo(np.int64).min
     blocks: list[tuple[int, Entries]] = field(default_factory=list)
-    """Chunk numbers and entries in the order of the file; empty for one that is not wanted."""
+    """Chunk numbers and entries in the order of the file; empty if the channel is not wanted."""
 
     def add(self, chunk: int, entries: Entries) -> None:
         """Add the messages of a chunk."""
-        if not len(entries):
-            return
-        self.count += len(entries)
-        self.first_ns = min(self.first_ns, int(entries[:, 0].min()))
-        self.last_ns = max(self.last_ns, int(entries[:, 0].max()))
-        if self.wanted:
-            self.blocks.append((chunk, entries))
+        if len(entries):
+            self.count += len(entries)
+            self.first_ns = min(self.first_ns, int(entries[:, 0].min()))
+            self.last_ns = max(self.last_ns, int(entries[:, 0].max()))
+            if self.wanted:
+                self.blocks.append((chunk, entries))
 
 
 def containers_in(
     path: Path, wanted: Wanted, stamp_of: StampOf, *, opened: IO[bytes] | None = None
 ) -> Iterator[Container]:
-    """Open the log in a file, and those that follow it in the same file.
+    """Open the log in a file, and the logs that follow it in the same file.
 
-    ``opened`` is the file where it lies elsewhere. ``stamp_of`` is called only next to damage.
+    ``opened`` is the open file if it lies elsewhere. ``stamp_of`` is called only next to damage.
     """
     rest = FileBytes(opened or path.open("rb", buffering=BUFFER))
     while len(rest):
@@ -82,25 +76,25 @@ def containers_in(
 
 
 class Container:
-    """One MCAP log, damaged or not; ``wanted`` is that of `containers_in`."""
+    """One MCAP log, damaged or not; ``wanted`` says which messages will be read."""
 
     def __init__(self, path: Path, scan: Scan, wanted: Wanted) -> None:
         self.path, self.scan, self._wanted = path, scan, wanted
         self.source, self.reader, self.chunks = scan.source, scan.reader, scan.chunks
         self.schemas, self.channels = scan.schemas, scan.channels
         self.data_is_right: bool | None = None
-        """Whether the checksum of all data is, None before it was looked at."""
+        """Whether the checksum of all data is right; None until it is checked."""
         self.misled: set[int] = set()
-        """Chunks whose message indexes were found to be wrong."""
+        """Chunks with wrong message indexes."""
         self.redefined: dict[int, str] = {}
-        """Which of two descriptions of topics is believed, by the offset of the second."""
-        logs = self._file()
+        """Which of two descriptions of a topic is believed, by the offset of the second."""
+        logs = self._place_messages()
         counts = {channel_id: log.count for channel_id, log in logs.items()}
         if scan.summary.statistics and counts != {
             channel_id: count for channel_id, count in self.expected.items() if count
         }:
-            logs = self._file(look=True)
-        if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
+            logs = self._place_messages(look=True)
+        if not all(map(self._is_described, logs)):  # their descriptions may be damaged
             late = [
                 record for record in scan.late if isinstance(record, Schema) or record.id in logs
             ]
@@ -109,43 +103,44 @@ class Container:
                     late += definitions(self.reader.remains(chunk))
             for record in late:
                 scan.define(record)
-            logs = self._file()
-        self.logs = self._file() if self._redefine(logs) else logs
-        """Where messages lie, by the number of their channel."""
+            logs = self._place_messages()
+        self.logs = self._place_messages() if self._settle_descriptions(logs) else logs
+        """The places of messages, by the number of their channel."""
         self.looked_into = frozenset(scan.seen)
-        """Chunks whose messages were not filed by their message indexes."""
+        """Chunks that were searched for messages, because they have no right message indexes."""
         scan.seen.clear()
 
     @property
     def expected(self) -> Mapping[int, int]:
-        """How many messages a channel should have, by the file's own statistics, if any."""
+        """The number of messages of each channel, by the file's own statistics, if any."""
         statistics = self.scan.summary.statistics
         return statistics.channel_message_counts if statistics else {}
 
     def topic(self, channel_id: int) -> str:
-        """Return the topic of a channel, or its number where it is not defined."""
+        """Return the topic of a channel, or its number if it is not defined."""
         channel = self.channels.get(channel_id)
         return channel.topic if channel else f"channel {channel_id}"
 
     def message(self, chunk: int, offset: int) -> Message:
-        """Read the message at ``offset`` in a chunk, or in the file if it is `OUTSIDE`."""
+        """Read the message at ``offset`` in a chunk, or in the file if the chunk is `OUTSIDE`."""
         is_outside = chunk == OUTSIDE
         records = self.source if is_outside else self.reader.read(self.chunks[chunk])
         return message_at(records, offset)
 
     def look(self, chunk: int, channel_id: int) -> Entries:
-        """Find the messages of a channel by looking into a chunk, whatever its indexes say."""
+        """Find the messages of a channel by looking into a chunk instead of using its indexes."""
         self.misled.add(chunk)
         return self.scan.look(chunk).get(channel_id, entries_of(array("Q")))
 
     def is_bad(self, chunk: int) -> bool:
-        """Whether a chunk was found to be unreadable."""
+        """Return whether a chunk turned out to be unreadable."""
         return chunk != OUTSIDE and self.chunks[chunk].offset in self.reader.bad
 
     def verify(self) -> Iterator[tuple[int, bytes]]:
-        """Read everything, so that all damage is known; a `BadRecord` if the disk fails.
+        """Read the log twice, so that all damage is known: by chunks, then in blocks.
 
-        Yields how many more bytes were read: first chunk by chunk, then the whole log in blocks.
+        Yields the size of each chunk with no bytes, and of each block with its bytes. A `BadRecord`
+        if the disk fails.
         """
         for number, chunk in enumerate(self.chunks):
             if number not in self.looked_into:
@@ -156,22 +151,22 @@ class Container:
             yield len(block), block
 
     def fingerprint(self) -> bytes:
-        """Return what tells this log from another without its messages: sizes, places, checksums.
+        """Return sizes, places and checksums, which identify the log without its messages.
 
-        Of a chunk without a checksum its first bytes take part. A `BadRecord` if the disk fails.
+        If a chunk has no checksum, its first bytes take part. A `BadRecord` if the disk fails.
         """
         parts = [b"%d %d" % (len(self.source), self.scan.data_crc)]
         for chunk, index in zip(self.chunks, self.scan.indexes, strict=True):
             parts.append(b"%d %d %d %d" % (chunk.offset, chunk.size, chunk.data_size, chunk.crc))
             if not chunk.crc:
                 begin = chunk.data_offset
-                parts.append(self.source[begin : begin + min(chunk.data_size, BEGIN)])
+                parts.append(self.source[begin : begin + min(chunk.data_size, 4096)])
             parts += [entries.tobytes() for _, entries in sorted((index or {}).items())]
         parts += [values.tobytes() for _, values in sorted(self.scan.loose.items())]
         return b"\n".join(parts)
 
     def _blocks(self) -> Iterator[bytes]:
-        """Yield the whole log in blocks, and check the checksum of all data."""
+        """Yield the log in blocks, and check the checksum of all data."""
         crc, end = 0, self.scan.data_end or 0
         for offset in range(0, len(self.source), BLOCK):
             block = self.source[offset : offset + BLOCK]
@@ -186,16 +181,16 @@ class Container:
         return not self.scan.loose and all(chunk.crc for chunk in self.chunks)
 
     def verify_data(self) -> None:
-        """Check the checksum of all data, unless that was done or the file has none."""
+        """Check the checksum of all data, if the file has one and it is not checked yet."""
         if self.data_is_right is None and self.scan.data_crc:
             with suppress(BadRecord):
-                deque(self._blocks(), 0)  # to their end, where the sum is compared
+                deque(self._blocks(), 0)  # the checksum is compared after the last block
 
     def close(self) -> None:
         """Close the file."""
         self.source.close()
 
-    def _file(self, *, look: bool = False) -> dict[int, ChannelLog]:
+    def _place_messages(self, *, look: bool = False) -> dict[int, ChannelLog]:
         logs: dict[int, ChannelLog] = {}
         indexes = [(number, self._index(number, look=look)) for number in range(len(self.chunks))]
         outside = {channel_id: entries_of(values) for channel_id, values in self.scan.loose.items()}
@@ -208,7 +203,7 @@ class Container:
         return logs
 
     def _index(self, number: int, *, look: bool) -> Mapping[int, Entries]:
-        """Messages of a chunk by channel, by its message indexes or by looking into it."""
+        """Return the messages of a chunk by channel, from its indexes or by looking into it."""
         if number in self.scan.seen:
             return self.scan.seen[number]
         index = self.scan.indexes[number] or {}
@@ -225,12 +220,12 @@ class Container:
         channel, schema = self._described(channel_id)
         return channel is not None and (schema is not None or channel.schema_id == 0)
 
-    def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
-        """Choose by its messages if a topic is described twice; return whether anything is new.
+    def _settle_descriptions(self, logs: Mapping[int, ChannelLog]) -> bool:
+        """Settle topics with two descriptions; return whether a description changes or is new.
 
-        Messages were written by the descriptions in the data, which stand in the first chunk or in
-        that of a channel's first message: those of a chunk with a checksum are believed if the
-        messages fit both.
+        The messages of a topic decide. If they fit both descriptions, one from a chunk with a
+        checksum is believed: the data describes a topic in the first chunk, or in the chunk of the
+        topic's first message.
         """
         before = {*self.channels}, {*self.schemas}
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
@@ -256,13 +251,13 @@ class Container:
         return bool(self.redefined) or before != ({*self.channels}, {*self.schemas})
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
-        """Count the messages that a description decodes, and sum up how near their stamps are."""
+        """Count messages of five chunks that a description decodes, and add up their delays."""
         distances = []
         for channel_id, log in logs.items():
             channel, schema = self._described(channel_id)
             if channel is None or record not in (channel, schema):
                 continue
-            for chunk, entries in log.blocks[:TRIED] if self._wanted(channel, schema) else ():
+            for chunk, entries in log.blocks[:5] if self._wanted(channel, schema) else ():
                 log_time, offset = entries[0].tolist()
                 with suppress(BadRecord):
                     stamp = self.scan.stamp_of(channel, schema, self.message(chunk, offset))
@@ -273,23 +268,23 @@ class Container:
 
 @dataclass(frozen=True)
 class Damage:
-    """Something wrong with a file."""
+    """A damage of a file."""
 
     path: Path
     offset: int
-    """The byte where it begins."""
+    """The byte at which it begins."""
     reason: str
     lossy: bool = True
-    """Whether messages are, or may be, lost or wrong by it."""
+    """Whether it may lose or spoil messages."""
     start_ns: int | None = None
     end_ns: int | None = None
-    """Log times of the messages before and after what is lost, None where unknown."""
+    """Log times of the messages before and after the loss; None if unknown."""
     lost: tuple[tuple[str, int], ...] = ()
-    """Topics and numbers of messages that are known to be lost."""
+    """Topics, and the number of messages that each is known to lose."""
     log_start_ns: int = 0
     """Log time from which the sentence counts seconds."""
     unsure_ns: int | None = None
-    """Log time from which messages may have other positions than those they were written at."""
+    """Log time from which messages may have other positions than at their recording."""
 
     def __str__(self) -> str:
         start, end = (
@@ -306,31 +301,40 @@ class Damage:
 
 
 def damage_of(container: Container) -> tuple[Damage, ...]:
-    """List what is wrong with a log, as far as it is known by now, in the file's order."""
-    damages = [*_gaps(container), *_chunks(container), *_others(container)]
+    """List the damage of a log that is known so far, in the order of the file."""
+    path = container.path
+    damages = [*_damaged_places(container), *_damaged_chunks(container), *_other_damage(container)]
     if not container.reader.bad and all(damage.unsure_ns is None for damage in damages):
-        damages += _missing(container)
+        for channel_id, expected in container.expected.items():
+            log = container.logs.get(channel_id)
+            missing = expected - (log.count if log else 0)
+            if missing > 0:
+                lost = ((container.topic(channel_id), missing),)
+                reason = "messages that the file's own statistics count are missing"
+                end = len(container.source)
+                damages.append(Damage(path, end, reason, lost=lost, unsure_ns=BEFORE_ALL))
     begin = container.source.begin
     if begin:
         reason = "another log begins here, behind the one before; its messages are read as well"
-        damages.append(Damage(container.path, 0, reason, lossy=False))
+        damages.append(Damage(path, 0, reason, lossy=False))
     damages = [replace(damage, offset=begin + damage.offset) for damage in damages]
     return tuple(sorted(damages, key=lambda damage: damage.offset))
 
 
 def sure_until(container: Container) -> int | None:
-    """Return the log time up to which messages have the positions at which they were written.
+    """Return the log time up to which messages have the positions of their recording.
 
-    Where an unknown number of messages is lost, those after them have other positions. None where
-    all are sure; damage that may lie anywhere gives a time before all others.
+    After a loss of an unknown number of messages they have other positions. None if all positions
+    are certain; damage that may lie anywhere gives a time before all others.
     """
     doubts = (damage.unsure_ns for damage in damage_of(container))
     return min((time - 1 for time in doubts if time is not None), default=None)
 
 
-def _gaps(container: Container) -> Iterator[Damage]:
+def _damaged_places(container: Container) -> Iterator[Damage]:
+    """Yield the bytes that make no sense, with the log times before and after each."""
     scan = container.scan
-    # The messages before the cut of a chunk that is cut off were saved.
+    # If a chunk is cut off, the messages before the cut were saved.
     places = [
         (chunk.offset - chunk.cut, chunk.start, (chunk.cut and scan.saved_ns) or chunk.end)
         for chunk in scan.chunks
@@ -340,7 +344,7 @@ def _gaps(container: Container) -> Iterator[Damage]:
         places += [(at, time, time) for time, at in zip(flat[::2], flat[1::2], strict=True)]
     places.sort()
     least = [*accumulate((start for _, start, _ in reversed(places)), min)][::-1]
-    # Each listed chunk that is not there is reported by itself.
+    # Chunks that the summary lists are reported one by one if they are missing.
     listed = bool(scan.summary.checked and scan.summary.chunks and not scan.loose)
     for offset, _, reason, lossy in scan.gaps:
         if not lossy and offset in container.reader.bad:
@@ -355,8 +359,8 @@ def _gaps(container: Container) -> Iterator[Damage]:
         yield Damage(container.path, offset, reason, is_lossy, before, after, unsure_ns=unsure)
 
 
-def _chunks(container: Container) -> Iterator[Damage]:
-    """Chunks that cannot be read, or are not there, or whose content is not what is said of it."""
+def _damaged_chunks(container: Container) -> Iterator[Damage]:
+    """Yield chunks that are unreadable, missing, or have wrong indexes."""
     path, reader, summary = container.path, container.reader, container.scan.summary
     listed = Counter(chunk[1:4] for chunk in summary.chunks.values() if summary.checked)
     for number, chunk in enumerate(container.chunks):
@@ -364,13 +368,13 @@ def _chunks(container: Container) -> Iterator[Damage]:
         listed[chunk[1:4]] -= 1
         if number in container.misled:
             yield Damage(path, at, "the message index of a chunk is wrong", lossy=False)
-        reason = reader.bad.get(at) or reader.kept.get(at, "")
+        reason = reader.bad.get(at) or reader.flawed.get(at, "")
         if reason:
             index = container.scan.indexes[number] or {}
             lost = tuple((container.topic(key), len(entries)) for key, entries in index.items())
             lost *= at in reader.bad
-            # Times that were kept may be wrong.
-            unsure = BEFORE_ALL if at in reader.kept else start
+            # The times in a flawed chunk may be wrong.
+            unsure = BEFORE_ALL if at in reader.flawed else start
             is_sure = index and number not in container.looked_into
             unsure_ns = None if is_sure else unsure
             yield Damage(path, at, reason, True, start, end, lost, unsure_ns=unsure_ns)
@@ -381,25 +385,13 @@ def _chunks(container: Container) -> Iterator[Damage]:
             yield Damage(path, chunk.offset, reason, True, start, chunk.end, unsure_ns=start)
 
 
-def _missing(container: Container) -> Iterator[Damage]:
-    """Messages that the file's own statistics count, where nothing else explains the loss."""
-    for channel_id, expected in container.expected.items():
-        log = container.logs.get(channel_id)
-        missing = expected - (log.count if log else 0)
-        if missing > 0:
-            lost = ((container.topic(channel_id), missing),)
-            reason = "messages that the file's own statistics count are missing"
-            end = len(container.source)
-            yield Damage(container.path, end, reason, lost=lost, unsure_ns=BEFORE_ALL)
-
-
-def _others(container: Container) -> Iterator[Damage]:
-    """Topics that are described twice or nowhere, and wrong checksums."""
+def _other_damage(container: Container) -> Iterator[Damage]:
+    """Yield topics that are described twice or nowhere, and wrong checksums."""
     path, scan, summary = container.path, container.scan, container.scan.summary
     for offset, reason in container.redefined.items():
         yield Damage(path, offset, reason)
     for channel_id, log in container.logs.items():
-        if channel_id not in container.channels:  # its number may be what is damaged
+        if channel_id not in container.channels:  # the number itself may be damaged
             reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
             span = log.first_ns, log.last_ns
             yield Damage(path, 0, reason, True, *span, unsure_ns=log.first_ns)

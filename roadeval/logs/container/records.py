@@ -1,8 +1,8 @@
 """Bytes by position, the records of an MCAP file in them, chunks of records, and the summary.
 
-The layouts are those of https://mcap.dev/spec. The `mcap` library reads all records but messages,
-chunks and their indexes: those are read here from a few bytes, so that a file can be walked
-through without reading its data. Whatever does not add up raises a `BadRecord`.
+The layouts are those of https://mcap.dev/spec. The `mcap` library reads most records; messages,
+chunks and their indexes are read here from a few bytes, so that a walk through a file does not read
+its data. A record whose parts contradict each other raises a `BadRecord`.
 """
 
 from __future__ import annotations
@@ -38,36 +38,30 @@ CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
-_LONGEST_NAME: Final = 64
-"""Bytes of a compression's name; a chunk that claims more is damaged."""
 DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 CHUNK, MESSAGE, MESSAGE_INDEX = Opcode.CHUNK, Opcode.MESSAGE, Opcode.MESSAGE_INDEX
-"""Kinds that are asked for at every record: an enumeration takes ten times as long to ask."""
+"""Opcodes that each record is compared with; a look-up in the enumeration is ten times slower."""
 COMPRESSIONS: Final = ("", "zstd", "lz4")
 _MAGIC: Final = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 PRIVATE: Final = 0x80
 """Opcodes from here on belong to applications."""
 PADDING: Final = 4
-"""A message may be padded at its end to a multiple of so many bytes, as CDR does."""
+"""A message may be padded at its end to a multiple of this many bytes, as CDR does."""
 _EXTENSION: Final = 64
 """Bytes that a later version of the format may add to a record; one with more is damaged."""
 
 BUFFER: Final = 16 << 10
 """Bytes that are read at once while walking from record to record."""
 BLOCK: Final = 1 << 20
-"""Bytes to uncompress at a time."""
+"""Bytes that are read or uncompressed at a time."""
 LARGEST_CHUNK: Final = 1 << 30
-"""Most bytes that are uncompressed of a chunk: a few of them can become any number."""
-LIKELY: Final = 64
-"""Largest ratio of compression of a chunk whose head claims another size."""
+"""Most uncompressed bytes of a chunk: a few compressed bytes can become any number."""
 IN_MEMORY: Final = 16 << 20
 """A chunk of more bytes is held in a temporary file; writers make chunks of about a megabyte."""
 CACHE: Final = 16 << 20
-"""Bytes of uncompressed chunks to keep: topics that run side by side share their chunks."""
-KEEP: Final = 64
-"""Chunks to keep at most."""
+"""Bytes of uncompressed chunks in memory: topics that are read side by side share chunks."""
 DOUBTED: Final = 256 << 20
-"""Bytes that are tried in vain in a file of no size; a bigger one has four more for each byte."""
+"""Bytes that are tried in vain in an empty file; every byte of the file adds four."""
 
 Buffer = bytes | memoryview
 Entries = npt.NDArray[np.int64]
@@ -75,10 +69,10 @@ Entries = npt.NDArray[np.int64]
 
 
 class FileBytes:
-    """A part of a file, sliced like `bytes`; a `BadRecord` where the disk fails.
+    """A part of a file, sliced like `bytes`; a `BadRecord` if the disk fails.
 
-    Nothing is mapped: pages of a mapped file count as memory of the program, and a file that
-    shrinks while it is read would end the program with a bus error.
+    The file is not mapped: mapped pages count as memory of the program, and a file that shrinks
+    while it is read would end the program with a bus error.
     """
 
     def __init__(self, file: IO[bytes], begin: int = 0, size: int | None = None) -> None:
@@ -105,7 +99,7 @@ class FileBytes:
             raise BadRecord(f"unreadable on its disk ({error.strerror})") from error
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes, as a file does; the last one alone, so that `left` tells of it."""
+        """Return the next bytes, as a file does; the last byte alone, so that `left` shows it."""
         data = self[self._at : self._at + max(min(size, self.left - 1), 1)]
         self._at += len(data)
         return data
@@ -121,7 +115,7 @@ class FileBytes:
 
 
 Bytes = FileBytes | memoryview
-"""Bytes that need not lie in memory."""
+"""Bytes in memory, or in a file."""
 
 
 class Record(NamedTuple):
@@ -132,7 +126,7 @@ class Record(NamedTuple):
     body: int
     end: int
     content: Any = None
-    """Its fields, as far as they were read."""
+    """Its fields, if they were read."""
 
 
 class Message(NamedTuple):
@@ -146,39 +140,39 @@ class Message(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """A chunk's head: where its data lies in the file, and what it claims to hold."""
+    """A chunk's head: the place of its data in the file, and the content that it claims."""
 
     offset: int
     start: int
     end: int
     """Log times of its first and its last message."""
     size: int
-    """Bytes of its records, uncompressed."""
+    """Bytes of its uncompressed records."""
     crc: int
-    """Checksum of these; 0 if not given."""
+    """Checksum of the uncompressed records; 0 if there is none."""
     compression: str
     data_offset: int
     data_size: int
     proven: bool = False
-    """Whether its checksum or the summary says that it lies here, of this length."""
+    """Whether its checksum or the summary confirms its place and length."""
     cut: bool = False
     """Whether it continues beyond the end of the file."""
     repaired: bool = False
-    """Whether its own head is damaged, and what it says was found out otherwise."""
+    """Whether its own head is damaged, and its content was found out otherwise."""
 
     @property
     def data_end(self) -> int:
-        """Return the byte of the file where its data ends."""
+        """The byte of the file at which its data ends."""
         return self.data_offset + self.data_size
 
     @property
     def record(self) -> Record:
-        """The record that it is."""
+        """The chunk as a record."""
         return Record(CHUNK, self.offset, self.offset + HEAD.size, self.data_end, self)
 
 
 class _Strict(ReadDataStream):
-    """The library's stream, which refuses to read across the record's end."""
+    """A stream of the library that refuses to read beyond the record's end."""
 
     def read(self, length: int) -> bytes:
         data: bytes = super().read(length) if length <= sys.maxsize else b""
@@ -188,7 +182,7 @@ class _Strict(ReadDataStream):
 
 
 def parse(opcode: int, body: Buffer) -> Any:
-    """Read a record that is neither message nor chunk, by the `mcap` library."""
+    """Read a record with the `mcap` library; it is neither a message nor a chunk."""
     try:
         name = Opcode(opcode).name
     except ValueError as error:
@@ -202,14 +196,15 @@ def parse(opcode: int, body: Buffer) -> Any:
 
 
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
-    """Read a chunk's head; the length that it says of its data may contradict the record's own."""
-    head = source[record.body : record.body + CHUNK_HEAD.size + _LONGEST_NAME + 8 + 4]
+    """Read a chunk's head; its length of the data may contradict the length of the record."""
+    # The name of a compression has at most 64 bytes; a longer one is damaged.
+    head = source[record.body : record.body + CHUNK_HEAD.size + 64 + 8 + 4]
     with suppress(struct.error):
         start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
-        at = CHUNK_HEAD.size + name_length  # a name that is too long leads out of the head
+        at = CHUNK_HEAD.size + name_length
         (data_size,) = struct.unpack_from("<Q", head, at)
         name = bytes(head[CHUNK_HEAD.size : at]).decode("utf-8", "replace")
-        if name not in COMPRESSIONS:  # it is damaged, and the data has a name of its own
+        if name not in COMPRESSIONS:  # it is damaged, but the data shows its own compression
             name = _MAGIC.get(bytes(head[at + 8 : at + 12]), name)
         return Chunk(record.offset, start, end, size, crc, name, record.body + at + 8, data_size)
     raise BadRecord("a chunk without a head")
@@ -217,7 +212,7 @@ def parse_chunk(source: Bytes, record: Record) -> Chunk:
 
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:
     """Read a message index: the channel, and its messages."""
-    # The library would make a tuple of each message, one by one.
+    # The library makes a tuple of each message, which takes a thousand times as long.
     channel_id, length = struct.unpack_from("<HI", body) if len(body) >= 6 else (0, 1)
     if length % 16 or not 0 <= len(body) - 6 - length <= _EXTENSION:
         raise BadRecord("a message index whose lengths contradict each other")
@@ -225,7 +220,7 @@ def parse_message_index(body: Buffer) -> tuple[int, Entries]:
 
 
 def message_at(records: Bytes, offset: int) -> Message:
-    """Read the message whose record begins at ``offset``."""
+    """Read the message with the record at ``offset``."""
     opcode, _, begin, end, _ = record_at(records, offset)
     if opcode != MESSAGE or not MESSAGE_HEAD.size <= end - begin <= LARGEST:
         raise BadRecord("no message where the index says")
@@ -237,7 +232,7 @@ def message_at(records: Bytes, offset: int) -> Message:
 
 
 def record_at(records: Bytes, offset: int) -> Record:
-    """Read the head of the record at ``offset``; it may claim to go beyond the end."""
+    """Read the head of the record at ``offset``; the record may claim to go beyond the end."""
     head = records[offset : offset + HEAD.size]
     if len(head) < HEAD.size:
         raise BadRecord("the file is cut off")
@@ -246,10 +241,7 @@ def record_at(records: Bytes, offset: int) -> Record:
 
 
 def walk(records: Bytes) -> Iterator[Record]:
-    """Yield the records of a chunk, as far as they are whole.
-
-    Zeros end them, too: a million would be as many records of no kind and no length.
-    """
+    """Yield the complete records of a chunk, up to the first zeros, which are no records."""
     offset, size = 0, len(records)
     while offset + HEAD.size <= size:
         record = record_at(records, offset)
@@ -266,20 +258,20 @@ class ChunkReader:
         self._source = source
         self._cache: OrderedDict[int, Bytes] = OrderedDict()
         self.patience = DOUBTED + 4 * len(source)
-        """Bytes that may still be uncompressed in vain: below 0 no chunk is proven."""
+        """Bytes that may still be uncompressed in vain; below 0 no chunk is proven."""
         self.bad: dict[int, str] = {}
         """Why a chunk could not be read, by its offset."""
-        self.kept: dict[int, str] = {}
-        """Damage of chunks of which something was read all the same, by their offsets."""
+        self.flawed: dict[int, str] = {}
+        """The damage of chunks that were read in spite of it, by their offsets."""
 
     def read(self, chunk: Chunk) -> Bytes:
-        """Read the records of a chunk; of one that is cut off, those before the cut."""
+        """Read the records of a chunk, or those before the cut if it is cut off."""
         at = chunk.offset
         if at in self.bad:
             raise BadRecord(self.bad[at])
         if at not in self._cache:
             try:
-                self._keep(at, self.remains(chunk) if chunk.cut else self._whole(chunk))
+                self._remember(at, self.remains(chunk) if chunk.cut else self._verified(chunk))
             except BadRecord as error:
                 self.bad[at] = str(error)
                 raise
@@ -288,19 +280,20 @@ class ChunkReader:
 
     def remains(self, chunk: Chunk) -> Bytes:
         """Uncompress a chunk as far as possible."""
-        return self._uncompressed(chunk, LARGEST_CHUNK, whole=False)
+        return self._uncompress(chunk, LARGEST_CHUNK, whole=False)
 
     def proof(self, chunk: Chunk) -> Chunk | None:
-        """Return a chunk whose content its checksum confirms, whatever size its head claims.
+        """Return the chunk as proven if its content has its checksum, whatever its head claims.
 
-        Without a checksum it must consist of whole records, of that size. None if it is not, or of
-        a file that claims one wrong chunk after the other.
+        Without a checksum it must consist of complete records, of the size that its head claims.
+        None if it does not, or if the file has claimed too many wrong chunks.
         """
         left = len(self._source) - chunk.data_offset
         if (chunk.size or chunk.crc) and 0 < chunk.data_size <= left and self.patience >= 0:
-            most = max(chunk.size, LIKELY * chunk.data_size) if chunk.crc else chunk.size
+            # If the head claims a wrong size, compression by more than 64 is not likely.
+            most = max(chunk.size, 64 * chunk.data_size) if chunk.crc else chunk.size
             with suppress(BadRecord):
-                records = self._uncompressed(chunk, most, whole=True)
+                records = self._uncompress(chunk, most, whole=True)
                 size = len(records)
                 if chunk.crc:
                     is_proven = crc_of(records) == chunk.crc
@@ -308,21 +301,21 @@ class ChunkReader:
                     ends = (record.end for record in walk(records))
                     is_proven = size == chunk.size == max(ends, default=0)
                 if is_proven:
-                    self._keep(chunk.offset, records)
+                    self._remember(chunk.offset, records)
                     return chunk._replace(size=size, proven=True)
                 self.patience -= size
             self.patience -= chunk.data_size
         return None
 
-    def _whole(self, chunk: Chunk) -> Bytes:
-        records = self._uncompressed(chunk, chunk.size, whole=True)
+    def _verified(self, chunk: Chunk) -> Bytes:
+        records = self._uncompress(chunk, chunk.size, whole=True)
         if len(records) < chunk.size:
             raise BadRecord(f"a chunk of {len(records)} bytes that claims to hold {chunk.size}")
         if chunk.crc and crc_of(records) != chunk.crc:
             raise BadRecord("a chunk whose checksum is wrong")
         return records
 
-    def _uncompressed(self, chunk: Chunk, most: int, *, whole: bool) -> Bytes:
+    def _uncompress(self, chunk: Chunk, most: int, *, whole: bool) -> Bytes:
         if chunk.compression == "" and whole and chunk.data_size > IN_MEMORY:
             return self._source.part(chunk.data_offset, chunk.data_end)
         patience, most = self.patience, min(most, LARGEST_CHUNK)
@@ -343,11 +336,11 @@ class ChunkReader:
         self.patience = patience
         return file.getbuffer() if isinstance(file, BytesIO) else FileBytes(file)
 
-    def _keep(self, offset: int, records: Bytes) -> None:
+    def _remember(self, offset: int, records: Bytes) -> None:
         self._cache[offset] = records
-        held = sum(map(len, self._cache.values()))
-        while (held > CACHE and len(self._cache) > 2) or len(self._cache) > KEEP:
-            held -= len(self._cache.popitem(last=False)[1])
+        size = sum(map(len, self._cache.values()))
+        while (size > CACHE and len(self._cache) > 2) or len(self._cache) > 64:
+            size -= len(self._cache.popitem(last=False)[1])
 
 
 def crc_of(records: Bytes) -> int:
@@ -359,7 +352,7 @@ def crc_of(records: Bytes) -> int:
 
 
 def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
-    """Uncompress a chunk into blocks of a bounded size, whatever they were compressed from."""
+    """Uncompress a chunk into blocks of a bounded size."""
     import zstandard
 
     data = source.part(chunk.data_offset, chunk.data_end)
@@ -387,50 +380,62 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
 
 
 _FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
-_OTHER_INDEXES: Final = Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET
-"""Records of a summary that must add up, and are not used."""
 
 
 @dataclass(slots=True)
 class Summary:
-    """The contents of the summary; nothing where it cannot be relied on."""
+    """The contents of the summary; it is empty if the summary is not reliable."""
 
     start: int | None = None
-    """The byte where it should begin, and the data end, by the footer; None if that is missing."""
+    """The byte at which it should begin, by the footer; None if the footer is missing."""
     checked: bool = False
-    """Whether its checksum is given, and right."""
+    """Whether it has a checksum, which is right."""
     problem: str = ""
-    """Why it cannot be relied on."""
+    """Why it is not reliable."""
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: dict[int, Chunk] = field(default_factory=dict)
-    """The chunks' heads but for their checksums, by offset."""
+    """The chunks' heads without their checksums, by offset."""
     index_ends: dict[int, int] = field(default_factory=dict)
-    """The byte where a chunk's message indexes end, by the chunk's offset."""
+    """The byte at which a chunk's message indexes end, by the chunk's offset."""
     statistics: Statistics | None = None
 
     def fill(self, records: memoryview) -> None:
-        """Take in the records of the summary, or raise `BadRecord`."""
+        """Read the records of the summary, or raise a `BadRecord`."""
         end = 0
         for opcode, _, body, end, _ in walk(records):
             if opcode == Opcode.CHUNK_INDEX:
-                chunk, index_end = _parse_chunk_index(records[body:end])
-                self.chunks[chunk.offset], self.index_ends[chunk.offset] = chunk, index_end
+                self._list_chunk(records[body:end])
             elif opcode in DEFINITIONS:
                 record = parse(opcode, records[body:end])
                 (self.schemas if opcode == Opcode.SCHEMA else self.channels)[record.id] = record
             elif opcode == Opcode.STATISTICS:
                 self.statistics = parse(opcode, records[body:end])
-            elif opcode in _OTHER_INDEXES:
-                parse(opcode, records[body:end])
+            elif opcode in (Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET):
+                parse(opcode, records[body:end])  # they are only checked
             elif opcode < PRIVATE:
                 raise BadRecord("its summary is not where it should be")
         if end != len(records):
             raise BadRecord("its summary does not add up")
 
+    def _list_chunk(self, body: Buffer) -> None:
+        """Read a chunk index, but not its map: the library makes an object of each entry of it."""
+        with suppress(struct.error, UnicodeDecodeError):
+            start, end, offset, length, map_size = struct.unpack_from("<QQQQI", body)
+            indexes, name_length = struct.unpack_from("<QI", body, 36 + map_size)
+            at = 48 + map_size
+            name = bytes(body[at : at + name_length]).decode()
+            data_size, size = struct.unpack_from("<QQ", body, at + name_length)
+            data_at = offset + HEAD.size + CHUNK_HEAD.size + name_length + 8
+            if data_at + data_size == offset + length:
+                chunk = Chunk(offset, start, end, size, 0, name, data_at, data_size)
+                self.chunks[offset], self.index_ends[offset] = chunk, offset + length + indexes
+                return
+        raise BadRecord("a chunk index that does not add up")
+
 
 def read_summary(source: Bytes) -> Summary:
-    """Read the summary, if it can be relied on."""
+    """Read the summary, and check whether it is reliable."""
     end = len(source) - _FOOTER_SIZE
     tail = bytes(source[max(end, 0) : len(source)])
     if len(tail) < _FOOTER_SIZE or tail[0] != Opcode.FOOTER or not tail.endswith(MAGIC):
@@ -443,7 +448,7 @@ def read_summary(source: Bytes) -> Summary:
         if not 0 <= end - footer.summary_start <= LARGEST:
             raise BadRecord("its summary is not where it should be")
         records = memoryview(source[footer.summary_start : end])
-        # Of the footer all but the checksum itself takes part in it.
+        # The checksum covers the summary and the footer up to the checksum itself.
         crc = zlib.crc32(tail[: HEAD.size + 16], zlib.crc32(records))
         if summary.checked and crc != footer.summary_crc:
             raise BadRecord("the checksum of its summary is wrong")
@@ -451,21 +456,3 @@ def read_summary(source: Bytes) -> Summary:
     except BadRecord as error:
         return Summary(footer.summary_start, problem=str(error))
     return summary
-
-
-def _parse_chunk_index(body: Buffer) -> tuple[Chunk, int]:
-    """Read a chunk's head but for its checksum, and where its message indexes end.
-
-    The library would read a long map first.
-    """
-    with suppress(struct.error, UnicodeDecodeError):
-        start, end, offset, length, map_size = struct.unpack_from("<QQQQI", body)
-        indexes, name_length = struct.unpack_from("<QI", body, 36 + map_size)
-        at = 48 + map_size
-        name = bytes(body[at : at + name_length]).decode()
-        data_size, size = struct.unpack_from("<QQ", body, at + name_length)
-        data_at = offset + HEAD.size + CHUNK_HEAD.size + name_length + 8
-        if data_at + data_size == offset + length:
-            chunk = Chunk(offset, start, end, size, 0, name, data_at, data_size)
-            return chunk, offset + length + indexes
-    raise BadRecord("a chunk index that does not add up")

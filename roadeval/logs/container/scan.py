@@ -1,8 +1,8 @@
 """The walk from record to record through a file, across damage.
 
-A record is taken when the next one adds up as well. Else one of the two is damaged, or bytes are
-missing: the next record that makes sense is looked for from just behind the head of the one in
-doubt, for its end may be false. A chunk is taken when its checksum or the summary confirms it.
+A record is taken if the next one is valid as well. Otherwise one of the two is damaged, or bytes
+are missing. The search for the next valid record begins just behind the head of the doubtful one,
+because its end may be false. A chunk is taken if its checksum or the summary confirms it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from roadeval.logs.container.records import (
+    BLOCK,
     CHUNK,
     COMPRESSIONS,
     DEFINITIONS,
@@ -54,33 +55,25 @@ from roadeval.logs.container.records import (
 from roadeval.logs.errors import BadRecord
 
 END: Final = -1
-"""In place of an opcode: the end of the file."""
+"""Stands for an opcode: the end of the file."""
 BORDER: Final = -2
-"""In place of an opcode: the eight bytes at which a log begins or ends."""
-_BLOCK: Final = 1 << 20
-"""Bytes to look through at a time."""
-_TRIED: Final = 256
-"""Bytes for which a place counts at which no record begins, besides those that one there claims."""
+"""Stands for an opcode: the eight bytes at which a log begins or ends."""
 _CANDIDATE: Final = re.compile(
     rb"(?=[\x02-\x0f].{4}\x00{4}|\x89MCAP0\r\n\x01|\x06\xff{8})", re.DOTALL
 )
 """The head of a record that is shorter than 4 GiB or was never ended, or a log's first bytes."""
 _HEADS: Final = HEAD.size + MESSAGE_HEAD.size
 _NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
-"""Records that are never found inside a chunk, unlike messages and their descriptions."""
-CONFLICTS: Final = 64
-"""Descriptions that contradict others which are looked at: each is tried on messages."""
+"""Records that never lie inside a chunk, unlike messages and their descriptions."""
 RECORDS: Final = 1 << 18
-"""Records that a chunk may hold beyond one for every few of its bytes: a bomb holds millions."""
-BYTES_PER_RECORD: Final = 4
-"""Bytes that a message takes at least, however well a chunk is compressed: its times differ."""
+"""Records of a chunk beyond one for every four of its bytes: a bomb holds millions."""
 
 StampOf = Callable[[Channel, Schema | None, Message], int | None]
-"""Return the header stamp of a message, None if it is not as long as its own fields say."""
+"""Return the header stamp of a message; None if its fields contradict its length."""
 
 
 class Gap(NamedTuple):
-    """Bytes that make no sense, to ``end`` (excluded)."""
+    """Bytes that make no sense, up to ``end`` (excluded)."""
 
     offset: int
     end: int
@@ -98,7 +91,7 @@ class Scan:
         self.chunks: list[Chunk] = []
         """The chunks in the order of the file."""
         self.indexes: list[dict[int, Entries] | None] = []
-        """For each chunk, its messages by channel; None where its message indexes are damaged."""
+        """Each chunk's messages by channel; None if its message indexes are damaged."""
         self.seen: dict[int, Mapping[int, Entries]] = {}
         """The messages by channel of the chunks that were looked into."""
         self.loose: dict[int, array[int]] = defaultdict(partial(array, "Q"))
@@ -106,19 +99,19 @@ class Scan:
         self.schemas = dict(self.summary.schemas)
         self.channels = dict(self.summary.channels)
         self.conflicts: list[tuple[int, Schema | Channel]] = []
-        """Other descriptions than these, with the offsets of them or their chunks."""
+        """Descriptions that contradict these, with the offsets of them or their chunks."""
         self.late: list[Schema | Channel] = []
-        """Descriptions behind the data, from a summary that cannot be relied on."""
+        """Descriptions behind the data, from a summary that is not reliable."""
         self.gaps: list[Gap] = []
         self.data_end: int | None = None
         self.after_data: int | None = None
         """Ends of the data section and of the record that ends it; None if the file ends before."""
         self.data_crc = 0
-        """Its checksum, 0 if not given."""
+        """Checksum of the data section; 0 if there is none."""
         self.saved_ns: int | None = None
-        """Log time of the last message saved from a chunk that is cut off."""
+        """Log time of the last message before the cut of a chunk that is cut off."""
         self.next_log: int | None = None
-        """The byte where another log begins in the same file."""
+        """The byte at which another log begins in the same file."""
         self._stop = None if self.summary.problem else self.summary.start
         self._listed = self.summary.chunks if self.summary.checked else {}
         end = self.summary.start or inf
@@ -152,7 +145,7 @@ class Scan:
             self.gaps.append(Gap(size, size, reason))
 
     def _following(self, record: Record) -> Record:
-        """Read the record behind one; refuse where that shows that either is damaged."""
+        """Read the record behind this one; a `BadRecord` if that shows that either is damaged."""
         if record.opcode == CHUNK and not record.content.proven:
             raise BadRecord("a chunk that is not whole")
         if record.end != self._stop:
@@ -164,22 +157,23 @@ class Scan:
         return Record(END, record.end, record.end, record.end)
 
     def _resync(self, record: Record, reason: str) -> Record:
-        """Find where the walk continues, where a record is in doubt or what follows it.
+        """Find the next record of the walk if a record, or what follows it, is doubtful.
 
         ::
 
-            ... | record | damaged ...... | next         the record is whole, and taken
-            ... | record, of a wrong length . | next     it is not, and left out
-            ... | record ...... | next .... |            bytes are missing in it: it is left out
+            ... | record | damaged ...... | next         the record is complete, and taken
+            ... | record, of a wrong length . | next     it is not complete, and left out
+            ... | record ...... | next .... |            it lacks bytes, and is left out
         """
         in_doubt = record.opcode == CHUNK and self.reader.proof(record.content) is None
-        whole = record.opcode in (CHUNK, BORDER) and not in_doubt
+        is_complete = record.opcode in (CHUNK, BORDER) and not in_doubt
+        search_from = record.end if is_complete else record.offset + 1
         following = None if in_doubt else self._hidden_chunk(record.end)
-        following = following or self._next(record.end if whole else record.offset + 1, record)
+        following = following or self._next(search_from, record)
         if in_doubt:
             record = self._remains(record.content, following.offset)
-        is_taken = whole or in_doubt or following.offset > record.end - PADDING
-        if record.opcode == MESSAGE and is_taken:  # if it is as long as its own fields say
+        is_taken = is_complete or in_doubt or following.offset > record.end - PADDING
+        if record.opcode == MESSAGE and is_taken:  # if its fields do not contradict its length
             channel = self.channels.get(record.content[0])
             schema = self.schemas.get(channel.schema_id) if channel else None
             is_taken = channel is not None and (
@@ -196,7 +190,7 @@ class Scan:
         return following
 
     def _remains(self, chunk: Chunk, end: int) -> Record:
-        """Return what is left of a chunk that is not whole, where the next record begins."""
+        """Return what is left of a damaged chunk before the next record, at ``end``."""
         if chunk.cut and end == chunk.data_end:
             return chunk.record
         left = chunk._replace(data_size=max(end - chunk.data_offset, 0), cut=False)
@@ -208,7 +202,7 @@ class Scan:
         return left.record
 
     def _take(self, record: Record) -> None:
-        """Note what a record says."""
+        """Note the content of a record."""
         opcode, content = record.opcode, record.content
         if opcode == MESSAGE:
             channel_id, log_time = content
@@ -222,7 +216,7 @@ class Scan:
                 times, offsets = entries[:, 0].view("u8"), entries[:, 1].view("u8")
                 is_within = chunk.start <= times.min() and times.max() <= chunk.end
                 if channel_id in index or not is_within or offsets.max() >= chunk.size:
-                    self.indexes[-1] = None  # it does not agree with its chunk
+                    self.indexes[-1] = None  # it contradicts its chunk
                 else:
                     index[channel_id] = entries
         elif opcode in DEFINITIONS:
@@ -250,24 +244,26 @@ class Scan:
                 self.look(len(self.chunks) - 1)
 
     def described(self, record: Schema | Channel) -> dict[int, Any]:
-        """Return the descriptions of the kind of this one, by their numbers."""
+        """Return the known descriptions of the same kind, by their numbers."""
         return self.schemas if isinstance(record, Schema) else self.channels
 
     def define(self, record: Any, offset: int | None = None) -> None:
-        """Learn a description, unless it is known; of one from the data note a contradiction."""
+        """Learn a new description; if one from the data contradicts a known one, note that."""
         other = self.described(record).setdefault(record.id, record)
-        if offset is None or record == other or len(self.conflicts) >= CONFLICTS:
+        # Each conflict is tried on messages, so their number is limited.
+        if offset is None or record == other or len(self.conflicts) >= 64:
             return
         if record not in (conflict for _, conflict in self.conflicts):
             self.conflicts.append((offset, record))
 
     def look(self, number: int) -> Mapping[int, Entries]:
-        """Walk through the records of a chunk; learn its channels and where its messages lie."""
+        """Walk through a chunk; learn its channels, and return the places of its messages."""
         chunk = self.chunks[number]
         records = self.reader.read(chunk)
         messages: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         end, problem = 0, ""
-        usual = chunk.data_size // BYTES_PER_RECORD
+        # However well a chunk is compressed, a message takes four bytes: its times differ.
+        usual = chunk.data_size // 4
         allowed = usual + self._records_left // 2
         for count, (opcode, offset, body, after, _) in enumerate(walk(records)):
             if count == allowed:
@@ -280,14 +276,14 @@ class Scan:
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
                 messages[channel_id].extend((log_time, offset))
             elif opcode in DEFINITIONS:
-                with suppress(BadRecord):  # its messages will show that it is missing
+                with suppress(BadRecord):  # its messages will show that the description is missing
                     self.define(parse(opcode, records[body:after]), chunk.offset)
             elif opcode < PRIVATE:
                 problem = "a chunk that holds more than messages, which is not read"
         if end != len(records) and not chunk.cut:
             problem = problem or "a chunk whose records do not add up"
         if problem:
-            self.reader.kept.setdefault(chunk.offset, problem)
+            self.reader.flawed.setdefault(chunk.offset, problem)
         if chunk.cut:
             self.saved_ns = max((max(values[::2]) for values in messages.values()), default=None)
         self.seen[number] = {channel_id: entries_of(flat) for channel_id, flat in messages.items()}
@@ -296,7 +292,7 @@ class Scan:
     # --- The record at a byte, and the next one that makes sense ----------------------------------
 
     def _record(self, offset: int) -> Record:
-        """Read the record that begins here; a `BadRecord` if its parts do not agree."""
+        """Read the record that begins here; a `BadRecord` if its parts contradict each other."""
         head = self.source[offset : offset + _HEADS]
         if head.startswith(MAGIC) or not head:
             end = offset + len(head[: len(MAGIC)])
@@ -315,7 +311,7 @@ class Scan:
         return record._replace(content=self._content(record, head))
 
     def _content(self, record: Record, head: bytes) -> Any:
-        """Read what a record says that is no chunk; of a message the channel and the log time."""
+        """Read a record that is no chunk; return channel and log time of a message."""
         opcode, offset, body, end, _ = record
         if opcode == Opcode.ATTACHMENT:
             at, inner = body + 16, inf
@@ -342,19 +338,19 @@ class Scan:
         return parse_message_index(data) if opcode == MESSAGE_INDEX else parse(opcode, data)
 
     def _around(self, offset: int) -> tuple[float, float]:
-        """Return where a chunk begins here or before, and the next one, by the summary."""
+        """Return the beginnings of the chunk at or before a byte and of the next one."""
         index = bisect_right(self._borders, offset)
         return self._borders[index - 1], self._borders[index]
 
     def _is_index_here(self, offset: int) -> bool:
-        """Whether a message index lies here, by the summary."""
+        """Return whether a message index lies here, by the summary."""
         return offset < self.summary.index_ends.get(int(self._around(offset)[0]), 0)
 
     def _is_described(self, channel_id: int) -> bool:
         return not self.channels or channel_id in self.channels
 
     def _chunk(self, record: Record) -> Chunk:
-        """Read a chunk's head, which gives its length twice, and the summary a third time."""
+        """Read a chunk's head, which gives the length twice; the summary gives it a third time."""
         heads, agrees, size = list[Chunk](), False, len(self.source)
         listed = self.summary.chunks.get(record.offset)
         with suppress(BadRecord):
@@ -376,7 +372,7 @@ class Scan:
         raise BadRecord("a chunk whose lengths contradict each other")
 
     def _hidden_chunk(self, offset: int) -> Record | None:
-        """Find a chunk here whose kind or lengths are damaged, by its checksum."""
+        """Find a chunk here by its checksum, although its kind or lengths are damaged."""
         with suppress(BadRecord):
             chunk = parse_chunk(self.source, record_at(self.source, offset))
             anything = Record(CHUNK, offset, offset, len(self.source))
@@ -388,22 +384,23 @@ class Scan:
         return None
 
     def _next(self, begin: int, doubted: Record) -> Record:
-        """Find the next record that makes sense at or after ``begin``, or the end of the file.
+        """Find the next valid record at or after ``begin``, or the end of the file.
 
-        The damage is in or behind the record ``doubted``. What lies in a chunk are no records of
-        the file.
+        The damage is in or behind the record ``doubted``. Records in a chunk are no records of the
+        file.
         """
         size = len(self.source)
         for offset in self._candidates(begin):
             if self.source[offset : offset + len(MAGIC)] == MAGIC:
-                # It may be this log's own beginning, moved, unless it follows on an end.
+                # Unless it follows an end, it may be the beginning of this log, which was moved.
                 begun = not self.summary.checked and self.source[0:8] == MAGIC
                 if begun or self.source[offset - 8 : offset] == MAGIC:
                     return Record(BORDER, offset, offset, offset + len(MAGIC))
                 continue
             with suppress(BadRecord):
+                # A place counts as 256 bytes, and the bytes that a record there claims.
                 claimed = record_at(self.source, offset).end - offset
-                self._tries_left -= _TRIED + (claimed if claimed <= size - offset else 0)
+                self._tries_left -= 256 + (claimed if claimed <= size - offset else 0)
                 if self._tries_left < 0:
                     break
                 record = self._record(offset)
@@ -412,15 +409,15 @@ class Scan:
         return Record(END, size, size, size)
 
     def _candidates(self, begin: int) -> Iterator[int]:
-        """Yield the bytes at or after ``begin`` where a record may begin."""
-        for at in range(begin, len(self.source), _BLOCK):
-            block = self.source[at : at + _BLOCK + HEAD.size]
+        """Yield the positions from ``begin`` on at which a record may begin."""
+        for at in range(begin, len(self.source), BLOCK):
+            block = self.source[at : at + BLOCK + HEAD.size]
             offsets = {at + match.start() for match in _CANDIDATE.finditer(block)}
-            offsets |= {int(border) for border in self._borders if at <= border < at + _BLOCK}
-            yield from sorted(offset for offset in offsets if offset < at + _BLOCK)
+            offsets |= {int(border) for border in self._borders if at <= border < at + BLOCK}
+            yield from sorted(offset for offset in offsets if offset < at + BLOCK)
 
     def _is_believed(self, record: Record, doubted: Record) -> bool:
-        """Whether it is more than chance that this looks like a record of the log."""
+        """Return whether this looks like a record of the log by more than chance."""
         opcode, content = record.opcode, record.content
         in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
         if opcode == CHUNK:
@@ -448,5 +445,5 @@ def definitions(records: Bytes) -> list[Any]:
 
 
 def entries_of(values: array[int]) -> Entries:
-    """Return rows of a flat array of log times and offsets."""
+    """Return the rows of a flat array of log times and offsets."""
     return np.frombuffer(values, np.int64).reshape(-1, 2)

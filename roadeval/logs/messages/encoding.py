@@ -1,8 +1,8 @@
 """Message encodings: from a message's bytes to its fields.
 
-Messages of images, calibrations and transforms are known by their schema's name, whatever its
-text: the layouts are those of ROS, of ``ffmpeg_image_transport_msgs`` and of Foxglove. They serve
-where a schema has no text, or one that no library reads.
+Messages of images, calibrations and transforms are recognised by their schema's name. The layouts
+are those of ROS, ``ffmpeg_image_transport_msgs`` and Foxglove; they are used if a schema has no
+text, or a text that no library reads.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from roadeval.logs.errors import BadMessage
 
 
 class TopicKind(StrEnum):
-    """What a topic carries."""
+    """The content of a topic."""
 
     IMAGE = "image"
     COMPRESSED = "compressed"
@@ -37,7 +37,7 @@ class TopicKind(StrEnum):
 Fields = tuple[tuple[str, str], ...]
 """Names and types of a message's fields, in the order of their bytes."""
 _CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q", "f8": "d"}
-"""The types that are numbers, as `struct` names them."""
+"""Codes of `struct` for the types that are numbers."""
 
 
 def _fields(text: str) -> Fields:
@@ -90,10 +90,10 @@ _KINDS_AND_FIELDS: Final = {
     "foxglove/FrameTransform": (TopicKind.TRANSFORMS, _FRAME),
     "foxglove/FrameTransforms": (TopicKind.TRANSFORMS, "transforms:frame[]"),
 }
-"""What messages carry, and their fields, by package and message."""
+"""Kinds and fields of messages, by package and message."""
 LAYOUTS: Final = {name: _fields(fields) for name, (_, fields) in _KINDS_AND_FIELDS.items()}
 KINDS: Final = {name.partition("/")[2]: kind for name, (kind, _) in _KINDS_AND_FIELDS.items()}
-"""The kinds by the message alone: its package may be another, with fields of the same names."""
+"""Kinds by the message alone, because another package may have fields of the same names."""
 PICTURES: Final = (TopicKind.IMAGE, TopicKind.COMPRESSED, TopicKind.VIDEO)
 
 
@@ -103,7 +103,7 @@ def parts_of(schema_name: str) -> list[str]:
 
 
 def fields_of(schema: Schema | None) -> Fields | None:
-    """Return the fields of a message whose schema's name is known.
+    """Return the fields of a message by its schema's name; None if that is unknown.
 
     >>> fields_of(Schema(1, b"", "", "foxglove_msgs/msg/CompressedVideo"))
     (('timestamp', 'time'), ('frame_id', 'str'), ('data', 'bytes'), ('format', 'str'))
@@ -115,24 +115,21 @@ def fields_of(schema: Schema | None) -> Fields | None:
     return LAYOUTS.get(f"{package}/{parts[-1]}")
 
 
-LONGEST_TEXT: Final = 1 << 16
-"""Bytes of a schema that the libraries are given: their time grows with the square of it."""
-
 Decode = Callable[[Buffer], Any]
-"""Read a message's bytes to an object that has its fields as attributes."""
+"""Decode the bytes of a message to an object with its fields as attributes."""
 
 
 class MessageReader(NamedTuple):
     """Reads the messages of one channel; any exception means that a message cannot be decoded."""
 
     decode: Decode
-    """Return a message with the fields of an image, named as ROS or Foxglove name them: ``data``
-    and ``format``, or ``data``, ``width``, ``height``, ``encoding`` and ``step``; the stamp in
+    """Return a message with the fields of an image by their names in ROS or Foxglove: ``data`` and
+    ``format``, or ``data``, ``width``, ``height``, ``encoding`` and ``step``; the stamp in
     ``header.stamp`` or ``timestamp``, the camera's name in ``header.frame_id`` or ``frame_id``."""
     stamp: Decode | None = None
-    """Return the stamp alone, where that is cheaper than to decode the message."""
+    """Return the stamp alone, if that is cheaper than to decode the message."""
     is_whole: Callable[[Buffer], bool] = lambda _: True
-    """Return whether a message that can be decoded is exactly as long as its fields say."""
+    """Return whether a message that can be decoded is exactly as long as its fields."""
 
 
 @dataclass(frozen=True)
@@ -142,23 +139,24 @@ class Encoding:
     name: str
     """A channel's ``message_encoding``."""
     reader: Callable[[Schema | None], MessageReader | None]
-    """Return what reads the messages of a schema, or None if nothing does."""
+    """Return the reader of a schema's messages, or None if there is none."""
     without_schema: TopicKind = TopicKind.OTHER
-    """What the messages of a channel without a schema may carry; the first ones are looked at."""
+    """The kind that a channel without a schema may have; its first messages decide."""
 
 
 def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Decode | None:
     """Return a decoder of the `mcap` project by a schema's text, or None if it has none.
 
-    ``factory`` is a new ``DecoderFactory``: they remember schemas by number, and numbers repeat
-    from file to file. ``encoding`` is the channel's message encoding.
+    ``factory`` is a new ``DecoderFactory``: it remembers schemas by number, and numbers repeat from
+    file to file. ``encoding`` is the channel's message encoding.
     """
-    if schema is None or not 0 < len(schema.data) <= LONGEST_TEXT:
+    # The parsers' time grows with the square of the text.
+    if schema is None or not 0 < len(schema.data) <= 1 << 16:
         return None
     try:
-        with redirect_stderr(io.StringIO()):  # the ROS parsers print what they stumble on
+        with redirect_stderr(io.StringIO()):  # the ROS parsers print their errors
             decode = factory.decoder_for(encoding, schema)
-    except Exception:  # a schema's text can be wrong in any way; its name may still do
+    except Exception:  # the text can be wrong in any way; the name may still be right
         return None
     return None if decode is None else lambda data: decode(bytes(data))
 
@@ -166,8 +164,8 @@ def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Dec
 class FieldReader:
     """Reads one field after the other.
 
-    ``order`` is the byte order as `struct` names it, ``start`` the position of the first field.
-    If ``aligned``, numbers stand at multiples of their size, at most of ``widest``.
+    ``order`` is the byte order in the notation of `struct`, ``start`` the position of the first
+    field. If ``aligned``, numbers lie at multiples of their size, at most of ``widest``.
     """
 
     def __init__(
@@ -179,7 +177,7 @@ class FieldReader:
 
     @property
     def left(self) -> int:
-        """Bytes not read yet."""
+        """Bytes that are not read yet."""
         return len(self._data) - self._at
 
     def read(self, fields: Fields) -> SimpleNamespace:
@@ -188,7 +186,7 @@ class FieldReader:
 
     def _field(self, kind: str) -> Any:
         if kind == "header" and not self._aligned:
-            self._number("u4")  # ROS 1 counts its headers
+            self._number("u4")  # headers of ROS 1 have a number
         if kind in NESTED:
             return self.read(NESTED[kind])
         if kind == "str":
@@ -198,7 +196,7 @@ class FieldReader:
         if kind.endswith("]"):
             kind, _, length = kind[:-1].partition("[")
             items = int(length or self._number("u4"))
-            # Each takes eight bytes at least: a damaged number of them would take for ever.
+            # Each takes at least eight bytes; a damaged number of items would take for ever.
             return [self._field(kind) for _ in range(min(items, self.left // 8 + 1))]
         return self._number(kind)
 
@@ -217,23 +215,23 @@ class FieldReader:
 
 @dataclass(frozen=True)
 class Layouts:
-    """The layouts that messages of a channel can have.
+    """The possible layouts of the messages of a channel.
 
-    Some writers log two kinds of message on a topic under the schema of the first.
+    Some writers log two kinds of messages on a topic, with the schema of the first.
     """
 
     named: Fields
-    """The layout that the channel's schema names."""
+    """The layout of the channel's schema."""
     begin: Callable[[Buffer], FieldReader]
     """Return a reader of a message's fields."""
     padding: int = 1
-    """A message may be longer by fewer bytes than that."""
+    """A message may be longer by fewer bytes than this."""
 
     def read(self, data: Buffer, decode: Decode | None) -> Any:
-        """Read a message by ``decode``, or by another image's layout if it fits that alone.
+        """Read a message by ``decode``, or by another image's layout if only that fits.
 
-        A message that is no image is read by its layout if it fits: the libraries refuse some
-        texts.
+        A message of another kind is read by its layout if that fits, because the libraries refuse
+        some texts of schemas.
         """
         is_image = ("data", "bytes") in self.named
         if message := self.fitting(data):
@@ -246,7 +244,7 @@ class Layouts:
         return decode(data) if decode else self.begin(data).read(self.named)
 
     def fitting(self, data: Buffer, fields: Fields | None = None) -> SimpleNamespace | None:
-        """Read a message by its own or other fields; None if it is not as long as they say."""
+        """Read a message by its own or other fields; None if its length does not fit them."""
         with suppress(BadMessage, struct.error):
             reader = self.begin(data)
             message = reader.read(fields or self.named)

@@ -1,7 +1,7 @@
-"""Pictures as messages carry them: raw pixels, an image file, or a frame of a video.
+"""Pictures in messages: raw pixels, image files, and frames of a video.
 
-A decoder makes one of a message's bytes, whatever the encoding of the message. Frames of a video
-need the frames before them.
+A decoder makes a picture from the bytes of a message in any encoding. Frames of a video depend on
+the frames before them.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from roadeval.logs.messages import encodings
 from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, TopicKind, parts_of
 from roadeval.logs.messages.frame_numbers import FrameNumbers
 from roadeval.logs.settings import parse_time
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 
 @dataclass(frozen=True, eq=False)
 class RawPicture:
-    """Pixels as logged: ``height`` rows of ``step`` bytes (0: not said), in ``encoding``."""
+    """Raw pixels: ``height`` rows of ``step`` bytes (0 if not stated) in ``encoding``."""
 
     stamp_ns: int
     width: int
@@ -43,62 +43,57 @@ class RawPicture:
     big_endian: bool
     data: Buffer
     frame_id: str = ""
-    """The camera's name, as the header has it."""
+    """The camera's name in the header."""
 
 
 @dataclass(frozen=True, eq=False)
 class CompressedPicture:
-    """An image file, or a packet of a video, with what the message says its format is."""
+    """An image file or a packet of a video; ``format`` is what the message states."""
 
     stamp_ns: int
     format: str
     data: Buffer
     frame_id: str = ""
     number: int | None = None
-    """A packet's number, as its encoder or its recorder counts it."""
+    """A packet's number, by its encoder or its recorder."""
 
 
 @dataclass(frozen=True, eq=False)
 class DecodedPicture:
-    """A video's frame: its packet, and what became of it together with those before it."""
+    """A decoded frame of a video; ``data`` is its packet."""
 
     stamp_ns: int
     data: Buffer
     pixels: Rgb
     turned: int = 1
-    """How it is to be turned, as EXIF counts it; it is turned already where limits say so."""
+    """Its orientation, as EXIF counts it; the pixels are turned already if the limits say so."""
 
 
 LoggedPicture = RawPicture | CompressedPicture
 Picture = LoggedPicture | DecodedPicture
 
 _BUFFERS: Final = (bytes, bytearray, memoryview)
-_SECONDS: Final = ("sec", "secs", "seconds")
-_NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
 _CODECS: Final = {
     **dict.fromkeys(("h264", "avc", "libx264"), "h264"),
     **dict.fromkeys(("h265", "hevc", "libx265"), "hevc"),
     "vp9": "vp9",
     "av1": "av1",
 }
-_START_CODES: Final = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
 
 
 def codec_of(picture: Picture) -> str | None:
-    """Return the video codec of a packet, None for a picture that stands alone."""
+    """Return the video codec of a packet; None for any other picture."""
     if not isinstance(picture, CompressedPicture):
         return None
     for word in re.split(r"[^a-z0-9]+", picture.format.lower()):
         if word in _CODECS:
             return _CODECS[word]
-    return "h264" if bytes(picture.data[:4]).startswith(_START_CODES) else None
+    start_codes = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
+    return "h264" if bytes(picture.data[:4]).startswith(start_codes) else None
 
 
 def picture_in(message: Any) -> LoggedPicture:
-    """Return the picture of a decoded message, by the names of its fields.
-
-    A `BadMessage` if it lacks the fields of an image.
-    """
+    """Return the picture in the fields of a message; a `BadMessage` if it lacks some."""
     try:
         stamp_ns, header = 0, getattr(message, "header", message)
         if header is not message:
@@ -109,25 +104,25 @@ def picture_in(message: Any) -> LoggedPicture:
         frame_id = frame_id if isinstance(frame_id, str) else ""
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = _name(message.format if hasattr(message, "format") else message.encoding)
-            data = _as(_BUFFERS, message.data)
+            data = _checked(_BUFFERS, message.data)
             if name.lower() == "zstd":
-                return _unpacked(stamp_ns, bytes(data), frame_id)
+                return _unpack_zstd(stamp_ns, bytes(data), frame_id)
             pts = int(message.pts) if hasattr(message, "pts") else None
             return CompressedPicture(stamp_ns, name, data, frame_id, pts)
         size, encoding = (int(message.width), int(message.height)), _name(message.encoding)
         step, order = int(getattr(message, "step", 0)), getattr(message, "is_bigendian", False)
-        data = _as(_BUFFERS, message.data)
+        data = _checked(_BUFFERS, message.data)
         return RawPicture(stamp_ns, *size, encoding, step, bool(order), data, frame_id)
-    except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
+    except (AttributeError, IndexError, TypeError, ValueError, LogError) as error:
         raise BadMessage("it lacks the fields of an image") from error
 
 
 _PACKED: Final = struct.Struct("<IIBII")
-"""Height, width, whether the upper byte comes first, bytes a row, letters of the encoding."""
+"""Height, width, whether the upper byte comes first, bytes a row, length of the encoding."""
 
 
-def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
-    """Return the raw image in a message of image_transport's ``zstd``, which once was gzip."""
+def _unpack_zstd(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
+    """Return the raw image in a message of image_transport's ``zstd``, which used to be gzip."""
     import zstandard
 
     try:
@@ -147,12 +142,12 @@ def _unpacked(stamp_ns: int, data: bytes, frame_id: str) -> RawPicture:
 
 
 def _name(text: Any) -> str:
-    """Return the name of an encoding; some writers fill its place up with zeros or blanks."""
-    return str(_as(str, text)).strip("\0 \t\r\n")
+    """Return the name of an encoding, which some writers pad with zeros or blanks."""
+    return str(_checked(str, text)).strip("\0 \t\r\n")
 
 
-def _as(kind: type | tuple[type, ...], value: Any) -> Any:
-    """Return a value, whose kind a damaged schema may have changed: a TypeError if so."""
+def _checked(kind: type | tuple[type, ...], value: Any) -> Any:
+    """Return a value; a TypeError if a damaged schema gives it another type."""
     if not isinstance(value, kind):
         raise TypeError(value)
     return value
@@ -162,9 +157,9 @@ def nanoseconds(stamp: Any) -> int:
     """Return the nanoseconds of a stamp in any of its forms, exactly."""
     if isinstance(stamp, str):
         return parse_time(stamp)
-    seconds = next(getattr(stamp, name) for name in _SECONDS if hasattr(stamp, name))
-    rest = next((getattr(stamp, name) for name in _NANOSECONDS if hasattr(stamp, name)), 0)
-    return int(seconds) * 1_000_000_000 + int(rest)
+    units = ("sec", "secs", "seconds"), ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
+    seconds, nanos = ([getattr(stamp, n) for n in names if hasattr(stamp, n)] for names in units)
+    return int(seconds[0]) * 1_000_000_000 + int(nanos[0] if nanos else 0)
 
 
 @dataclass(frozen=True)
@@ -174,17 +169,17 @@ class Decoder:
     reader: MessageReader
 
     def fields(self, data: Buffer) -> Any:
-        """Return the message with its fields as attributes, whatever it carries."""
+        """Return a message of any kind with its fields as attributes."""
         with _one_error():
             return self.reader.decode(data)
 
     def picture(self, data: Buffer) -> LoggedPicture:
-        """Return the picture that it carries."""
+        """Return the picture in a message."""
         with _one_error():
             return picture_in(self.reader.decode(data))
 
     def stamp(self, data: Buffer) -> int:
-        """Return its stamp alone, in nanoseconds."""
+        """Return the stamp of a message in nanoseconds."""
         if self.reader.stamp is None:
             return self.picture(data).stamp_ns
         with _one_error():
@@ -194,13 +189,13 @@ class Decoder:
 @cache
 def message_encodings() -> Mapping[str, Encoding]:
     """Return the message encodings of the folder, by name."""
-    return {encoding.name: encoding for encoding in chain(*found_in(encodings, "ENCODINGS"))}
+    return {encoding.name: encoding for encoding in chain(*collect(encodings, "ENCODINGS"))}
 
 
 def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
-    """Return what a channel carries, by its schema's name.
+    """Return the kind of a channel by its schema's name.
 
-    Of transforms only those that are static: others come too often to be indexed.
+    Transforms that are not static are of no use here, and too many to be indexed.
     """
     if schema is None:
         encoding = message_encodings().get(channel.message_encoding)
@@ -211,9 +206,9 @@ def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
 
 
 def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
-    """Return what decodes the messages of a channel; a `BadMessage` if nothing decodes them."""
+    """Return the decoder of a channel's messages; a `BadMessage` if there is none."""
     parts = () if schema is None else (schema.name, schema.encoding, schema.data)
-    decoder = _decoder_for(channel.message_encoding, *parts)
+    decoder = _cached_decoder(channel.message_encoding, *parts)
     if decoder is None:
         messages, name = channel.message_encoding, schema.encoding if schema else "no"
         raise BadMessage(f"{messages!r} messages with {name!r} schema are not readable")
@@ -230,8 +225,8 @@ def message_stamp(channel: Channel, schema: Schema | None, message: Message) -> 
 
 
 @lru_cache(maxsize=64)
-def _decoder_for(message_encoding: str, *parts: Any) -> Decoder | None:
-    """Return what decodes the messages of a schema, whichever channels and files share it."""
+def _cached_decoder(message_encoding: str, *parts: Any) -> Decoder | None:
+    """Return the decoder of a schema's messages, which channels and files share."""
     encoding = message_encodings().get(message_encoding)
     schema = Schema(1, name=parts[0], encoding=parts[1], data=parts[2]) if parts else None
     reader = encoding.reader(schema) if encoding else None
@@ -240,7 +235,7 @@ def _decoder_for(message_encoding: str, *parts: Any) -> Decoder | None:
 
 @contextmanager
 def _one_error() -> Iterator[None]:
-    """Turn whatever the libraries' parsers raise into a `BadMessage`."""
+    """Turn the exceptions of the libraries' parsers into a `BadMessage`."""
     try:
         yield
     except BadMessage:
@@ -251,21 +246,15 @@ def _one_error() -> Iterator[None]:
 
 
 PATIENCE: Final = 16
-"""Packets to feed beyond a frame before it counts as not decodable."""
-_LIMITED: Final = 16, 235
-"""The luma of black and white in a video that does not say its range."""
-_STRAY: Final = 0.02
-"""Share of the luma beyond it that compression explains."""
+"""Packets that are decoded beyond a frame before it counts as undecodable."""
 LOST: Final = "a frame that it builds upon is lost"
-FARTHEST_KEY: Final = 3000
-"""Packets to look back for a keyframe."""
 _DECODERS: Final = {"av1": "libdav1d"}
-"""Where the codec's own name is not a decoder that every machine can run."""
+"""Decoders that run on every machine, if the codec's own decoder does not."""
 _PARAMETERS: Final = {
     "h264": re.compile(rb"\x00\x00\x01[\x07\x27\x47\x67]"),
     "hevc": re.compile(rb"\x00\x00\x01[\x42\x43]"),
 }
-"""Heads of sequence parameters, which some encoders send in a packet of their own."""
+"""Heads of sequence parameters, which some encoders send in a separate packet."""
 
 
 class PictureSequence(Protocol):
@@ -279,9 +268,9 @@ class PictureSequence(Protocol):
 
 
 class Video:
-    """The frames of a video topic, by position; fastest one after the other.
+    """The frames of a video topic by position, fastest one after the other.
 
-    A frame that is larger than the limits allow is not decoded.
+    Frames beyond the limits are not decoded.
     """
 
     def __init__(self, packets: PictureSequence, limits: Limits) -> None:
@@ -298,9 +287,9 @@ class Video:
         return len(self._packets)
 
     def picture(self, position: int) -> DecodedPicture:
-        """Decode a frame, from the keyframe before it if need be.
+        """Decode a frame, from the keyframe before it if necessary.
 
-        A `FrameError` if it, or one that it builds upon, cannot be decoded.
+        A `FrameError` if it, or a frame that it depends on, cannot be decoded.
         """
         if position not in self._ready and not 0 <= position - self._next <= PATIENCE:
             keyframe = self._keyframe(position)
@@ -309,19 +298,19 @@ class Video:
         while position not in self._ready and self._next <= position + PATIENCE:
             if not next(self._steps, False):
                 break
-        outcome = self._ready.pop(position, FrameError("the decoder gave no picture for it"))
-        self._ready = {ready: late for ready, late in self._ready.items() if ready > position}
-        if isinstance(outcome, FrameError):
-            raise outcome
-        return outcome
+        frame = self._ready.pop(position, FrameError("the decoder gave no picture for it"))
+        self._ready = {at: outcome for at, outcome in self._ready.items() if at > position}
+        if isinstance(frame, FrameError):
+            raise frame
+        return frame
 
     def _begin(self, position: int) -> None:
         self._next, self._damaged, self._ready = position, False, {}
         self._shown, self._steps = (position, 0), self._decode(position)
 
     def _keyframe(self, position: int) -> int:
-        """Position of the last keyframe at or before ``position``."""
-        for candidate in range(position, max(position - FARTHEST_KEY, -1), -1):
+        """Return the position of the last keyframe at or before ``position``."""
+        for candidate in range(position, max(position - 3000, -1), -1):
             with suppress(FrameError):
                 if is_keyframe(self._packets.picture(candidate)):
                     return candidate
@@ -329,7 +318,7 @@ class Video:
 
     @cached_property
     def _counted(self) -> bool:
-        """Whether the packets are counted one by one, as the first ones show."""
+        """Whether the packets are numbered one by one, as the first ones show."""
         first = list[Picture]()
         for position in range(min(PATIENCE, len(self._packets))):
             with suppress(FrameError):
@@ -338,14 +327,14 @@ class Video:
         return 4 * steps.count(1) >= 3 * len(steps) > 0
 
     def _follows(self, packet: Picture, last: Picture | None, numbers: FrameNumbers) -> bool:
-        """Whether no packet that this one builds upon is lost before it, as far as is known."""
+        """Return whether no packet that this one depends on is known to be lost before it."""
         is_gap = codec_of(packet) == "h264" and numbers.is_gap(bytes(packet.data))
         if numbers.are_counted or last is None:
             return not is_gap
         return not (self._counted and _step(last, packet) > 1)
 
     def _decode(self, begin: int) -> Iterator[bool]:
-        """Decode from a keyframe on, a packet a step; the frames come into ``_ready``."""
+        """Decode from a keyframe on, one packet at each step; the frames go to ``_ready``."""
         decoder: Any = None
         last, numbers = None, FrameNumbers()
         waiting, broken = dict[int, Picture](), ""
@@ -386,13 +375,13 @@ class Video:
         return decoder
 
     def _take(self, decoder: Any, unit: Any, waiting: dict[int, Picture]) -> None:
-        """Decode a packet, or what is left in the decoder, and note the frames that come out."""
+        """Decode a packet, or empty the decoder, and take the frames that come out."""
         try:
             frames = decoder.decode(unit)
         except self._av.FFmpegError as error:
             raise BadMessage(self._reason(decoder, error)) from error
         for frame in frames:
-            # The decoder has filled in what is damaged.
+            # The decoder fills in damaged parts.
             self._damaged = frame.is_corrupt or (self._damaged and not frame.key_frame)
             packet = waiting.pop(frame.pts, None)
             if packet is not None and self._damaged:
@@ -408,7 +397,7 @@ class Video:
                 self._ready[frame.pts] = picture
 
     def _look(self, frame: Any, packet: Picture) -> None:
-        """Note what is doubtful of a frame, which come in the order in which they are shown."""
+        """Note doubts about a frame; frames come in the order in which they are shown."""
         last, stamp = self._shown
         self._shown = frame.pts, packet.stamp_ns
         if frame.pts < last:
@@ -424,8 +413,8 @@ class Video:
         if not (is_limited and form.name.startswith("yuv4") and form.components[0].bits == 8):
             return
         luma = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[::4, : frame.width : 4]
-        share = ((luma < _LIMITED[0]) | (luma > _LIMITED[1])).mean()
-        if share > _STRAY:
+        share = ((luma < 16) | (luma > 235)).mean()
+        if share > 0.02:  # compression explains less
             self.notes.setdefault(
                 "range",
                 f"{100 * share:.0f} % of the luma of frame {frame.pts} lies beyond 16 to 235, and "
@@ -434,7 +423,7 @@ class Video:
             )
 
     def _reason(self, decoder: Any, error: Any) -> str:
-        """Return why a packet cannot be decoded: its size, where the decoder tells it."""
+        """Return why a packet cannot be decoded: its size, if the decoder knows it."""
         reason = f"its video cannot be decoded: {error.strerror}"
         if not (decoder.width and decoder.height):
             most = f"{self._limits.max_pixels} pixels that `frames.max_pixels` allows"
@@ -447,13 +436,13 @@ class Video:
 
 
 def _step(one: Picture, other: Picture) -> int:
-    """Return by how much the numbers of two packets differ; 0 where one has none."""
+    """Return the difference between the numbers of two packets; 0 if one has none."""
     first, second = (getattr(packet, "number", None) for packet in (one, other))
     return 0 if first is None or second is None else second - first
 
 
 def turn_of(frame: Any) -> int:
-    """Return how a frame of PyAV's is to be turned by its display matrix, as EXIF counts it."""
+    """Return the orientation of a frame of PyAV by its display matrix, as EXIF counts it."""
     for side in frame.side_data:
         if side.type.name == "DISPLAYMATRIX":
             a, b, _, c, d = struct.unpack("=5i", bytes(side)[:20])
@@ -464,7 +453,7 @@ def turn_of(frame: Any) -> int:
 
 
 def is_keyframe(packet: Picture) -> bool:
-    """Whether decoding can begin with this packet: a keyframe, or parameters in front of one."""
+    """Return whether decoding can begin here: at a keyframe, or parameters in front of one."""
     codec = codec_of(packet)
     if not isinstance(packet, CompressedPicture) or codec is None:
         return False

@@ -1,4 +1,4 @@
-"""Decoding pictures: a camera's to RGB, a label image to whole numbers."""
+"""Decoding of pictures: a camera's to RGB, a label image to whole numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True)
 class PixelFormat:
-    """How an encoding lays out its pixels."""
+    """The layout of the pixels of an encoding."""
 
     dtype: str
     channels: int
@@ -40,7 +40,7 @@ class PixelFormat:
     rows: float = 1.0
     """Rows stored for each image row: 3/2 for planar 4:2:0, 3 for 4:4:4."""
     block: tuple[int, int] = (1, 1)
-    """Pixels of one block share their colours; width and height are whole multiples of it."""
+    """Width and height of a block of pixels that share their colours."""
 
     @property
     def is_grey(self) -> bool:
@@ -48,7 +48,7 @@ class PixelFormat:
         return self.code == "COLOR_GRAY2RGB"
 
 
-def _formats() -> dict[str, PixelFormat]:
+def _make_formats() -> dict[str, PixelFormat]:
     uyvy = PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1))
     yuy2 = replace(uyvy, code="COLOR_YUV2RGB_YUY2")
     formats = {"yuv422": uyvy, "uyvy": uyvy, "yuyv": yuy2, "yuv422_yuy2": yuy2}
@@ -70,7 +70,7 @@ def _formats() -> dict[str, PixelFormat]:
     return formats
 
 
-FORMATS: Final = _formats()
+FORMATS: Final = _make_formats()
 """Every raw encoding, by its name in lower case."""
 
 
@@ -83,7 +83,7 @@ def format_of(picture: RawPicture) -> PixelFormat:
 
 
 def raw_format(picture: RawPicture, limits: Limits) -> PixelFormat:
-    """Return the pixel format of a picture; a `BadMessage` if that or its size cannot be."""
+    """Return the pixel format of a picture; a `BadMessage` if that or its size is impossible."""
     format_ = format_of(picture)
     with _bad_message():
         limits.check(picture.width, picture.height)
@@ -98,7 +98,7 @@ def raw_format(picture: RawPicture, limits: Limits) -> PixelFormat:
 def rows_of(picture: RawPicture, limits: Limits) -> Array:
     """Return the samples of a picture as rows, without padding, in this machine's byte order.
 
-    A `BadMessage` as of `raw_format`, or if the data is shorter than its size says.
+    A `BadMessage` as in `raw_format`, or if the data is too short.
     """
     width, height = picture.width, picture.height
     format_ = raw_format(picture, limits)
@@ -119,19 +119,30 @@ def rows_of(picture: RawPicture, limits: Limits) -> Array:
     return np.ascontiguousarray(array, dtype.newbyteorder("="))
 
 
-def _raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None) -> Rgb:
-    """Convert a picture to RGB as `to_rgb` does."""
+def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
+    """Decode a picture to ``(H, W, 3)`` uint8 RGB; grey fills all channels.
+
+    ``white`` is the white sample of pictures with more than eight bits: by default the greatest of
+    16 bits, or 1 for fractions. A `BadMessage` if the picture is damaged or cannot be decoded.
+    """
+    if isinstance(picture, DecodedPicture):
+        return picture.pixels
+    if isinstance(picture, CompressedPicture):
+        if _is_depth(picture):
+            raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
+        with _bad_message():
+            return decoding.to_rgb(picture.data, limits, white)
     import cv2
 
     samples, layout = eight_bits(rows_of(picture, limits), white), format_of(picture)
     code = layout.code
     if layout.rows == 3:
-        # As 4:2:2 in which each pixel comes twice, for OpenCV does not know 4:4:4.
+        # OpenCV does not know 4:4:4; it is converted as 4:2:2 with each pixel twice.
         y, uv = np.split(samples, [picture.height])
         pairs = np.stack([np.stack([y, y], axis=2), uv.reshape(*y.shape, 2)], axis=3)
         samples = pairs.reshape(picture.height, -1, 2)
     if code is None:
-        # An array of its own: a part of a message may not be written to.
+        # The result is a copy, because views of a message are read-only.
         return np.require(samples, requirements=["C", "W"])
     try:
         rgb = cv2.cvtColor(samples, getattr(cv2, code))
@@ -141,27 +152,8 @@ def _raw_to_rgb(picture: RawPicture, limits: Limits, white: float | None) -> Rgb
     return np.ascontiguousarray(rgb[:, :: 1 + (layout.rows == 3)], np.uint8)
 
 
-def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
-    """Decode a picture to ``(H, W, 3)`` uint8 RGB; grey fills all channels.
-
-    ``white`` is the sample of more than eight bits that is white: by default the greatest one of 16
-    bits, and 1 of fractions. A `BadMessage` if it is damaged or cannot be decoded.
-    """
-    if isinstance(picture, RawPicture):
-        return _raw_to_rgb(picture, limits, white)
-    if isinstance(picture, DecodedPicture):
-        return picture.pixels
-    if _is_depth(picture):
-        raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
-    with _bad_message():
-        return decoding.to_rgb(picture.data, limits, white)
-
-
 def deep_samples(picture: Picture, limits: Limits) -> Array | None:
-    """Return the samples of a picture that has more than eight bits; None of any other.
-
-    A `BadMessage` as of `to_rgb`.
-    """
+    """Return samples of more than eight bits; None for other pictures. Errors as in `to_rgb`."""
     if isinstance(picture, RawPicture):
         return rows_of(picture, limits) if format_of(picture).dtype != "u1" else None
     file = _file_in(picture)
@@ -174,10 +166,8 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
 def to_labels(picture: Picture, limits: Limits) -> Array:
     """Decode a label picture to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
-    Of an image with a palette these are the palette's indices, or its greys if it has only
-    greys. An image of three equal channels is a label image of one.
-
-    A `BadMessage` as `to_rgb`.
+    An image with a palette gives its indices, or its greys if it has no colours. Three equal
+    channels count as one. A `BadMessage` as in `to_rgb`.
     """
     if isinstance(picture, RawPicture):
         layout = format_of(picture)
@@ -191,10 +181,7 @@ def to_labels(picture: Picture, limits: Limits) -> Array:
 
 
 def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
-    """Return width and height by what a picture's head says; None of video, which has none.
-
-    A `BadMessage` if the head cannot be read.
-    """
+    """Return width and height by a picture's head; None for video. A `BadMessage` if damaged."""
     if isinstance(picture, RawPicture):
         return picture.width, picture.height
     with _bad_message():
@@ -202,7 +189,7 @@ def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
 
 
 def lossy_format(picture: Picture) -> str:
-    """Return the name of a format whose compression changes values, as JPEG; else empty."""
+    """Return the name of a picture's format if that changes values, as JPEG does; else empty."""
     if isinstance(picture, RawPicture):
         return ""
     if (file := _file_in(picture)) is None:
@@ -224,17 +211,14 @@ def _is_depth(picture: CompressedPicture) -> bool:
 
 
 def _file_in(picture: CompressedPicture | DecodedPicture) -> Buffer | None:
-    """Return the image file of a picture, None if it is a video's."""
+    """Return the image file of a picture; None for video."""
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
         return None
     return file_of(picture)
 
 
 def file_of(picture: CompressedPicture) -> Buffer:
-    """Return the image file of a picture: of ``compressedDepth`` the PNG of whole numbers.
-
-    A `BadMessage` if it has none.
-    """
+    """Return a picture's image file; a `BadMessage` if it has depth that is no PNG."""
     if not _is_depth(picture):
         return picture.data
     if re.search("(?i)32fc1|rvl", picture.format):

@@ -1,1 +1,1 @@
-"""The topics of a log: their kinds, labels, pairing, and which to replay."""
+"""The topics of a log: their messages, calibrations, and the choice of topics to replay."""

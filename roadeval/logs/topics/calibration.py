@@ -1,7 +1,7 @@
-"""The calibration of a camera, and where it is mounted, from the messages of a log.
+"""The calibration of a camera and its mounting, from the messages of a log.
 
-Read are ``sensor_msgs/CameraInfo`` and Foxglove's ``CameraCalibration``, the first message of a
-topic that can be used; and static transforms, ROS's ``tf2_msgs/TFMessage`` and Foxglove's
+These are the first usable message of ``sensor_msgs/CameraInfo`` or Foxglove's
+``CameraCalibration``, and static transforms in ROS's ``tf2_msgs/TFMessage`` or Foxglove's
 ``FrameTransform(s)``.
 """
 
@@ -16,35 +16,30 @@ import numpy as np
 
 from roadeval.data import Calibration, Mounting
 from roadeval.data.arrays import Vector
+from roadeval.images.formats import Size
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.topics.choose import words
-from roadeval.logs.topics.reader import Size, TopicInfo, TopicReader
+from roadeval.logs.topics.reader import TopicInfo, TopicReader
 
-LOOKED_AT: Final = 100
-"""Messages of static transforms that are read, at most, of each topic."""
-FARTHEST, NOT_UNIT = 1e9, 0.01
-"""Metres between two frames, and how far a quaternion's length may be from 1, at most."""
 OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
 """The rotation from a camera's axes to those of a vehicle: x ahead, y left, z up (REP 103)."""
-DEEPEST: Final = 50
-"""Frames on the way from a camera to the root, at most: more are a loop."""
 
 _UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError, OverflowError
 Transform = tuple[str, Vector, Vector]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
-Known = tuple[Calibration | None, str]
-"""A calibration for the images and what is to be said of it, or None and why there is none."""
+LensAndNote = tuple[Calibration | None, str]
+"""A calibration for the images and remarks on it, or None and why there is none."""
 
 RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undistorted"})
-"""Words of topics of images without distortion."""
+"""Words in the topics of images without distortion."""
 _ADVICE: Final = "give its lens with `ground`"
 
 
 def is_rectified(name: str) -> bool:
-    """Return whether images without distortion have this name, as ``/cam/rect/image/compressed``.
+    """Return whether a topic's name says that its images are rectified, as ``/cam/rect/image``.
 
-    RealSense calls images that bear theirs ``image_rect_raw``.
+    RealSense calls images with distortion ``image_rect_raw``.
     """
     parts = map(words, name.split("/"))
     return any(part & RECTIFIED and "raw" not in part for part in parts)
@@ -52,20 +47,20 @@ def is_rectified(name: str) -> bool:
 
 def calibration_of(
     image: TopicInfo, topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]
-) -> Known:
-    """Return the calibration of a camera and what is to be said of it, or None and why.
+) -> LensAndNote:
+    """Return the calibration of a camera and remarks on it, or None and why there is none.
 
-    The topic is that whose ``frame_id`` is the images' own; of several, that whose path shares most
-    with theirs. The text is empty, too, where the log has no calibration at all.
+    Its topic has the ``frame_id`` of the images; among several, its path shares most with theirs.
+    The text is empty if the log has no calibration at all.
     """
     lenses = {
-        topic.name: _lens_of(topic, readers[topic.name], image)
+        topic.name: _read_lens(topic, readers[topic.name], image)
         for topic in topics
         if topic.kind is TopicKind.CALIBRATION and topic.count
     }
     matching = {name: lens for name, lens in lenses.items() if lens[0] in ("", image.frame_id)}
-    near = max((_shared(name, image.name) for name in matching), default=0)
-    best = [name for name in matching if _shared(name, image.name) == near]
+    near = max((_shared_parts(name, image.name) for name in matching), default=0)
+    best = [name for name in matching if _shared_parts(name, image.name) == near]
     best = [name for name in best if matching[name][1]] or best
     if len(best) != 1 or not (near or matching[best[0]][0] or matching[best[0]][1] is None):
         why = f"none of {', '.join(lenses)} is clearly of {image.name}"
@@ -76,16 +71,16 @@ def calibration_of(
         return None, f"{topic}: {why}"
     reader = readers[topic]
     with suppress(*_UNREADABLE):
-        last, _ = _read(topic, reader.fields(len(reader) - 1), image)
+        last, _ = _lens_in(topic, reader.fields(len(reader) - 1), image)
         if last not in (None, lens):
             return None, f"{topic}: it changes within the log"
     static = [info.name for info in topics if info.kind is TopicKind.TRANSFORMS and info.count]
-    transforms = dict(_transforms(readers[name] for name in static))
+    transforms = dict(_read_transforms(readers[name] for name in static))
     notes, mounting = [why] * bool(why), None
     if static and not transforms:
         notes.append(f"its place is not known: {', '.join(static)} cannot be read")
     try:
-        mounting = _mounting(frame, transforms)
+        mounting = _find_mounting(frame, transforms)
     except ValueError as error:
         notes.append(f"its place is not known: the transform of {error}")
     if mounting and mounting.has_body_axes:
@@ -95,18 +90,18 @@ def calibration_of(
     return replace(lens, mounting=mounting), "; ".join(notes)
 
 
-def _shared(one: str, other: str) -> int:
-    """Return how many parts at the begin two paths share."""
+def _shared_parts(one: str, other: str) -> int:
+    """Count the parts at the beginning that two paths share."""
     pairs = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
     return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)
 
 
-def _lens_of(
+def _read_lens(
     topic: TopicInfo, reader: TopicReader, image: TopicInfo
 ) -> tuple[str, Calibration | None, str]:
-    """Return a topic's ``frame_id`` and what a message says that can be used.
+    """Return a topic's ``frame_id``, and the calibration and note of its first usable message.
 
-    Some drivers send zeros until they are ready: few are read, ever farther from the first one.
+    Some drivers send zeros until they are ready. A few messages are read, ever farther apart.
     """
     frame, why = "", "no message can be read"
     positions = {0, *(1 << power for power in range(7)), len(reader) - 1}
@@ -114,7 +109,7 @@ def _lens_of(
         try:
             message = reader.fields(position)
             frame = str(getattr(message, "header", message).frame_id)
-            lens, why = _read(topic.name, message, image)
+            lens, why = _lens_in(topic.name, message, image)
         except _UNREADABLE:
             why = f"its {topic.encoding} messages of {topic.schema} cannot be read: {_ADVICE}"
             continue
@@ -123,8 +118,8 @@ def _lens_of(
     return frame, None, why
 
 
-def _read(topic: str, message: Any, image: TopicInfo) -> Known:
-    """Read a message. Of rectified images it is the projection that holds, without distortion."""
+def _lens_in(topic: str, message: Any, image: TopicInfo) -> LensAndNote:
+    """Read a message; for rectified images take its projection, without distortion."""
 
     def numbers(name: str) -> tuple[float, ...]:
         value = getattr(message, name, None)
@@ -144,12 +139,12 @@ def _read(topic: str, message: Any, image: TopicInfo) -> Known:
             lens = flat
     if lens.problem:
         return None, f"its {lens.problem}"
-    fitted, said = _fitted(lens, message, image.size or size)
-    return fitted, "; ".join(filter(None, (note, said)))
+    fitting, remark = _fit_to_size(lens, message, image.size or size)
+    return fitting, "; ".join(filter(None, (note, remark)))
 
 
-def _fitted(full: Calibration, message: Any, size: Size) -> Known:
-    """Return a calibration for images of a size: of a part of the sensor, binned, or scaled."""
+def _fit_to_size(full: Calibration, message: Any, size: Size) -> LensAndNote:
+    """Return the calibration for images of a size: a part of the sensor, binned, or scaled."""
     region = getattr(message, "roi", None)
     left, top, across, down = (
         int(getattr(region, name, 0)) for name in ("x_offset", "y_offset", "width", "height")
@@ -173,10 +168,10 @@ def _fitted(full: Calibration, message: Any, size: Size) -> Known:
     return None, f"it is for images of {part.width}x{part.height}"
 
 
-def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform]]:
-    """Yield each frame's transform in its parent; later ones replace earlier ones."""
+def _read_transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform]]:
+    """Yield the transform of each frame in its parent; later ones replace earlier ones."""
     for reader in readers:
-        for position in range(min(len(reader), LOOKED_AT)):
+        for position in range(min(len(reader), 100)):
             with suppress(*_UNREADABLE):
                 message = reader.fields(position)
                 for frame in getattr(message, "transforms", [message]):
@@ -188,24 +183,25 @@ def _transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform
                     yield str(frame.child_frame_id), (str(parent), at, turn)
 
 
-def _mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | None:
-    """Follow the transforms from a camera's frame to the root; None if they begin nowhere.
+def _find_mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | None:
+    """Follow the transforms from a camera's frame to the root.
 
-    A loop has no root: then there is none, too. A `ValueError` names a transform that is none.
+    None if the frame has no transform, or the transforms form a loop. A `ValueError` names an
+    impossible transform.
     """
     names = {name.lstrip("/"): transform for name, transform in transforms.items()}
     at, turn, name = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), frame.lstrip("/")
-    for depth in range(DEEPEST):
+    for depth in range(50):  # more are a loop
         if name not in names:
             if not depth:
                 return None
             return Mounting(name, tuple(at.tolist()), tuple(turn.tolist()))
         parent, offset, rotation = names[name]
         length = np.linalg.norm(rotation)
-        if not (np.abs(offset) < FARTHEST).all():
+        if not (np.abs(offset) < 1e9).all():
             metres = ", ".join(f"{length:.6g}" for length in offset)
             raise ValueError(f"{name} is moved by {metres} m")
-        if not abs(length - 1) < NOT_UNIT:
+        if not abs(length - 1) < 0.01:
             raise ValueError(f"{name} has a quaternion of length {length:.6g}, not 1")
         rotation = rotation / length
         twice = 2 * np.cross(rotation[:3], at)

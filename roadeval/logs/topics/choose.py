@@ -1,4 +1,4 @@
-"""The choice of topics to replay: those the user named, else those whose role is clear."""
+"""The choice of topics to replay: those that the user names, else those with a clear role."""
 
 from __future__ import annotations
 
@@ -29,10 +29,9 @@ NO_TRUTH_WORDS: Final = _set(
 """Words for a network's output, and for pictures of labels."""
 TRANSPORT_WORDS: Final = _set("image img images raw compressed png mono rect color")
 TRANSPORTS: Final = _set("compressed compressedDepth theora zstd ffmpeg h264 h265 hevc av1")
-"""Last parts of topics by which image_transport sends the images of the topic before them."""
+"""Last parts of topics that image_transport adds to the topic of an image."""
 SIDES: Final = _set("front rear left right side top bottom center")
 PLAIN_WORDS: Final = TRANSPORT_WORDS | _set("camera cam front left right rear")
-DEPTH_FORMATS: Final = ("16uc1", "32fc1")
 SAME_WORDS: Final = {
     "cam": "camera",
     "back": "rear",
@@ -58,26 +57,31 @@ def words(name: str) -> frozenset[str]:
     return parts | {"groundtruth"} if {"ground", "truth"} <= parts else parts
 
 
-def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicInfo, str]:
+def choose_image(topics: Sequence[TopicInfo], setting: str | None) -> tuple[TopicInfo, str]:
     """Choose the camera's topic; return it and why.
 
-    A `LogError` if the one asked for is not there or no image, or if none or several are
-    candidates.
+    A `LogError` if the named topic is missing or no image, or if none or several are candidates.
     """
-    if asked is not None:
-        return named(topics, asked, "`topics.image`"), "asked for"
+    if setting is not None:
+        return named(topics, setting, "`topics.image`"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
-    sent = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
-    # Of several transports of a camera one that can be read is taken, without loss if possible.
+    colours = [
+        topic
+        for topic in candidates
+        if "depth" not in topic.format.lower()
+        and topic.format.lower() not in ("16uc1", "32fc1")
+        and not words(topic.name) & {"depth", "disparity"}
+    ] or candidates
+    # If a camera has several transports, a readable one is taken, without loss if possible.
     best: dict[str, TopicInfo] = {}
-    for topic in sorted(sent, key=lambda topic: (bool(topic.problem), bool(topic.lossy))):
+    for topic in sorted(colours, key=lambda topic: (bool(topic.problem), bool(topic.lossy))):
         base, _, transport = topic.name.rpartition("/")
         best.setdefault(base if transport in TRANSPORTS else topic.name, topic)
-    cameras = [topic for topic in sent if topic in best.values()]
+    cameras = [topic for topic in colours if topic in best.values()]
     if len(cameras) == 1:
         why = "the only camera image" if len(images) > 1 else "the only image topic"
-        return cameras[0], f"{why}, of {len(sent)} transports" if len(sent) > 1 else why
+        return cameras[0], f"{why}, of {len(colours)} transports" if len(colours) > 1 else why
     if cameras:
         raise LogError(
             f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or "
@@ -95,21 +99,20 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
 def choose_truth(
     topics: Sequence[TopicInfo],
     image: TopicInfo,
-    asked: str | None,
+    setting: str | None,
     labels: LabelSettings,
     *,
     of_rig: bool = False,
 ) -> Choice:
     """Choose the topic of the road truth.
 
-    An image of single values is preferred; one of colours where those are asked for, or where there
-    is no other. A `LogError` if the one asked for is not there or no image, or if several are
-    candidates, or are another camera's; or if the meaning of values is given, and the only label
-    images are compressed with loss. ``of_rig`` says that other cameras are replayed, too, so that
-    labels of these are none of this one's.
+    An image of single values is preferred, unless the settings name colours. ``of_rig`` says that
+    other cameras are replayed, too, whose labels are left out. A `LogError` if the named topic is
+    missing or no image; if several are candidates, or belong to another camera; or if the settings
+    name values, and the only label images are compressed with loss.
     """
-    if asked is not None:
-        return _asked_for(topics, asked, "`topics.truth`")
+    if setting is not None:
+        return _named_choice(topics, setting, "`topics.truth`")
     candidates = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
     roads = [topic for topic in candidates if not topic.lossy]
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
@@ -145,23 +148,23 @@ def lossy_labels(name: str, format_: str) -> str:
 
 
 def _clear_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
-    """Return the topics of the first kind that there is, in the order of preference."""
-    named = [(t, words(t.name)) for t in roads]
-    by_name = [t for t, n in named if n & LABEL_WORDS or (n & MASK_WORDS and n & ROAD_WORDS)]
+    """Return the topics of the best kind that is present."""
+    with_words = [(t, words(t.name)) for t in roads]
+    by_name = [t for t, n in with_words if n & LABEL_WORDS or (n & MASK_WORDS and n & ROAD_WORDS)]
     coloured, single = ([t for t in by_name if t.channels == n] for n in (3, 1))
-    # A mask whose name does not say that it masks something other than the road.
-    no_others = MASK_WORDS | PLAIN_WORDS | words(image.name)
-    masks = [t for t in roads if t.channels == 1 and words(t.name) <= no_others]
+    # The name of such a mask has no word for anything but the road.
+    plain_words = MASK_WORDS | PLAIN_WORDS | words(image.name)
+    masks = [t for t in roads if t.channels == 1 and words(t.name) <= plain_words]
     return (coloured if colors else []) or single or masks or coloured
 
 
-def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None) -> Choice:
+def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, setting: str | None) -> Choice:
     """Choose the topic of the true shadow.
 
-    A `LogError` if the one asked for is not there or no image, or if several are candidates.
+    A `LogError` if the named topic is missing or no image, or if several are candidates.
     """
-    if asked is not None:
-        return _asked_for(topics, asked, "`topics.shadow`")
+    if setting is not None:
+        return _named_choice(topics, setting, "`topics.shadow`")
     shadows = [
         topic
         for topic in _label_topics(topics, image)
@@ -176,12 +179,12 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
 
 
 def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]) -> str:
-    """Return what shows that a label topic belongs to another camera than the image's; else empty.
+    """Return why a label topic belongs to another camera than the image's; empty if it does not.
 
     A topic's path and its header's ``frame_id`` name a camera by a side (front, rear, left ...), by
-    a number (``cam1``), or by any word in the names of the log's cameras. Neither may name another
-    camera than the image's; a label's may name less of it (``/front/labels`` of
-    ``/front/left/image``), unless another camera of the log fits better.
+    a number (``cam1``), or by any word in the names of the log's cameras. Both must fit the image's
+    camera. They may have fewer words (``/front/labels`` for ``/front/left/image``), unless another
+    camera of the log fits better.
     """
     cameras = _other_cameras(topics, image)
     for what, theirs, ours, others in (
@@ -194,7 +197,7 @@ def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]
 
 
 def _cameras(theirs: str, ours: str, *others: str) -> list[set[str]]:
-    """Return the words of each name that tell a camera from others."""
+    """Return the words of each name that distinguish a camera from others."""
     names = SIDES.union(*map(_camera_words, (ours, *others)))
     return [
         {word for word in _camera_words(text) if word in names or re.fullmatch(r"camera\d+", word)}
@@ -209,9 +212,9 @@ def _is_another(of_label: set[str], of_image: set[str], *of_others: set[str]) ->
 
 
 def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicInfo]) -> None:
-    """Refuse, as a `LogError`, names of labels that carry another camera's name, or several ones'.
+    """Raise a `LogError` if names of labels have the name of another camera, or of several.
 
-    Numbers of frames are no part of a camera's name, as in ``cam_0012.png``.
+    Numbers of frames, as in ``cam_0012.png``, are no part of a camera's name.
     """
     ours, *others = (
         f"{topic.name} {topic.frame_id}" for topic in (image, *_other_cameras(topics, image))
@@ -256,8 +259,8 @@ def _camera_words(name: str) -> frozenset[str]:
     return common - TRANSPORT_WORDS - LABEL_WORDS - MASK_WORDS - ROAD_WORDS
 
 
-def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
-    """Return the topic of a name; an empty one takes none."""
+def _named_choice(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
+    """Return the topic of a name; an empty name means none."""
     topic = named(topics, name, setting) if name else None
     return Choice(topic, "asked for" if name else "asked to use none")
 
@@ -265,7 +268,7 @@ def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
 def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
     """Return the image topic that a setting names.
 
-    A `LogError` if there is none of that name, or it carries no images; the valid ones are listed.
+    A `LogError` if there is none, or it carries no images; it lists the valid ones.
     """
     for topic in topics:
         if topic.name == name and topic.is_image:
@@ -279,7 +282,7 @@ def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
 
 
 def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
-    """Topics that look like label images and are no network's output."""
+    """Return the topics that look like label images, but not like a network's output."""
     return [
         topic
         for topic in topics
@@ -294,17 +297,12 @@ def _looks_like_label(topic: TopicInfo) -> bool:
     return topic.is_image and bool(words(topic.name) & (LABEL_WORDS | MASK_WORDS | SHADOW_WORDS))
 
 
-def _looks_like_depth(topic: TopicInfo) -> bool:
-    named_depth = bool(words(topic.name) & {"depth", "disparity"})
-    return named_depth or topic.format.lower() in DEPTH_FORMATS or "depth" in topic.format.lower()
-
-
 def _only(
     topics: Sequence[TopicInfo], image: TopicInfo, what: str, setting: str
 ) -> TopicInfo | None:
     """Return the topic that shares most words with the image's name, then its ``frame_id``.
 
-    None if there is no topic, a `LogError` if several are left.
+    None if there is no topic; a `LogError` if several share as much.
     """
     shared = [
         (len(words(topic.name) & words(image.name)), topic.frame_id == image.frame_id)

@@ -1,4 +1,4 @@
-"""The messages of one topic, in the order of their log times; and what is said of a topic."""
+"""The messages of one topic, in the order of their log times; and the description of a topic."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.images.decoding import orientation_of
-from roadeval.images.formats import Limits
+from roadeval.images.formats import Limits, Size
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError
@@ -31,18 +31,11 @@ from roadeval.logs.messages.pictures import (
 from roadeval.logs.messages.pixels import lossy_format, raw_format, to_labels
 from roadeval.logs.settings import NS
 
-PROBES: Final = 3
-"""Messages to try before a topic counts as undecodable."""
-KEPT_BYTES: Final = 16 << 20
-"""Bytes of a topic's messages to keep, small ones: a label's stamp is looked at before its turn,
-and its chunk, mostly of other topics, is long forgotten when its picture is needed."""
+CACHE: Final = 16 << 20
+"""Bytes of a topic's small messages in memory. A label's stamp is read long before its picture, and
+its chunk, which holds mostly other topics, is no longer in memory then."""
 SMALL: Final = 50_000_000
-"""Bytes of a log that is read whole where that is of use: it takes a moment."""
-CLOUDS: Final = ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
-GAP: Final = 2.5
-"""A step of more than so many median periods is a gap."""
-
-Size = tuple[int, int]
+"""Bytes of a log that may be read completely, which takes a moment."""
 
 
 @dataclass(frozen=True)
@@ -54,29 +47,27 @@ class TopicInfo:
     encoding: str
     """The messages' encoding: ``cdr``, ``protobuf``, ..."""
     kind: TopicKind
-    """What its messages carry, by the schema's name."""
+    """The content of its messages, by the schema's name."""
     count: int
-    """Messages that are in the log, readable or not."""
+    """Messages in the log, readable or not."""
     first_ns: int | None = None
     last_ns: int | None = None
     """Log times of the first and the last message, None if there is none."""
     rate_hz: float | None = None
     """One over the median time between messages; None below two messages."""
     gaps: tuple[tuple[int, int], ...] = ()
-    """Log times around each step of more than 2.5 median periods (for images only)."""
+    """Log times around each step of more than 2.5 median periods, for images only."""
     format: str = ""
-    """For images: the pixel encoding or file format of the first readable message."""
-    size: tuple[int, int] | None = None
-    """For images: width and height of it."""
+    """Pixel encoding or file format of the first readable image, as the fields below."""
+    size: Size | None = None
     channels: int | None = None
-    """For images: 1 if it is an image of single values, 3 if of colours."""
+    """1 for an image of single values, 3 for one of colours."""
     lossy: str = ""
-    """For images: the format of the first readable one if its compression changes values, as JPEG;
-    else empty."""
+    """Its format if that changes values, as JPEG; else empty."""
     frame_id: str = ""
-    """For images: the camera's name in the header of the first readable message, or empty."""
+    """The camera's name in its header, or empty."""
     turned: int = 1
-    """For images: how the first readable one is to be turned, as EXIF counts it; 1 for not."""
+    """Its orientation, as EXIF counts it; 1 if it is not turned."""
     problem: str = ""
     """Why no message could be decoded, or empty."""
 
@@ -88,11 +79,11 @@ class TopicInfo:
     @property
     def is_cloud(self) -> bool:
         """Whether its messages carry points in space."""
-        return self.schema in CLOUDS
+        return self.schema in ("sensor_msgs/msg/PointCloud2", "foxglove.PointCloud")
 
 
 def describe_topic(reader: TopicReader) -> TopicInfo:
-    """Describe a topic from its messages' places and the first one that can be decoded."""
+    """Describe a topic by the places of its messages, and by the first readable one."""
     _, channel, schema, _ = reader.channels[0]
     logs = [source.log for source in reader.channels if source.log.count]
     count = sum(log.count for log in logs)
@@ -101,10 +92,10 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
     times = reader.log_times
     period = median_period(times)
     rate = NS / period if period > 0 else None
-    # A topic that is not read tells only the number of messages and their time range.
+    # If a topic is not read, only the number of its messages and their time range are known.
     if rate is None and count > 1 and first is not None and last is not None and last > first:
         rate = (count - 1) * NS / (last - first)
-    before = np.flatnonzero(np.diff(times) > GAP * period) if period > 0 else ()
+    before = np.flatnonzero(np.diff(times) > 2.5 * period) if period > 0 else ()
     topic = TopicInfo(
         name=reader.name,
         schema=schema.name if schema else "",
@@ -125,21 +116,24 @@ def median_period(log_times: npt.NDArray[np.int64]) -> int:
 
 
 def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
-    """Add what the first messages show; without a schema, they alone show whether it is images."""
-    problem, tried = "", 0
+    """Describe the first readable image of a topic.
+
+    Three messages are tried. A topic without a schema is one of images only if one is readable.
+    """
+    problem, tries = "", 0
     for position in range(len(reader)):
         try:
-            return replace(topic, **_shown_by(reader, position))
+            return replace(topic, **_describe_picture(reader, position))
         except (FrameError, BadMessage) as error:
             problem = problem or str(error)
-        tried += not reader.is_lost(position)
-        if tried == PROBES:
+        tries += not reader.is_lost(position)
+        if tries == 3:
             break
     return replace(topic, problem=problem) if topic.schema else replace(topic, kind=TopicKind.OTHER)
 
 
-def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
-    """Return the fields of a `TopicInfo` that a message shows."""
+def _describe_picture(reader: TopicReader, position: int) -> dict[str, Any]:
+    """Return the fields of a `TopicInfo` that one of its messages shows."""
     picture = reader.picture(position)
     kind, size, channels, turned = TopicKind.VIDEO, None, 3, 1
     if isinstance(picture, RawPicture):
@@ -165,9 +159,9 @@ def _shown_by(reader: TopicReader, position: int) -> dict[str, Any]:
 
 
 UNREADABLE: Final = -(2**63) + 1
-"""A stamp that cannot be read."""
+"""Stands for a stamp that cannot be read."""
 UNREAD: Final = UNREADABLE - 1
-"""A stamp not read yet."""
+"""Stands for a stamp that is not read yet."""
 
 
 class FileChannel(NamedTuple):
@@ -177,15 +171,14 @@ class FileChannel(NamedTuple):
     channel: Channel
     schema: Schema | None
     log: ChannelLog
-    """Where its messages lie."""
+    """The places of its messages."""
 
 
 class TopicReader:
     """The messages of one topic, from all files and channels that carry it.
 
-    Reading is for one thread at a time. ``name`` and ``channels`` are the topic and the channels
-    that carry it, ``limits`` those on the images that are decoded of it. ``log_times`` are ``(n,)``
-    int64 nanoseconds, ascending; equal ones in the order of the file.
+    Only one thread may read at a time. ``limits`` apply to its images. ``log_times`` are ``(n,)``
+    int64 nanoseconds, ascending; equal ones are in the order of the file.
     """
 
     def __init__(
@@ -200,8 +193,7 @@ class TopicReader:
         self.name = name
         self.channels = channels
         self.limits = limits
-        # A file that is damaged may have lost the topic itself.
-        self._files = files
+        self._files = files  # all of the log: a damaged one may have lost the topic itself
         self._lacks_files = lacks_files
         rows = [
             np.hstack([entries, np.full((len(entries), 2), (number, chunk), np.int64)])
@@ -212,34 +204,34 @@ class TopicReader:
         table = table[np.argsort(table[:, 0], kind="stable")]
         self.log_times: npt.NDArray[np.int64] = np.ascontiguousarray(table[:, 0])
         self._places = table[:, 1:]
-        """``(n, 3)``: each message's offset, its channel's number here, and its chunk's."""
-        # An array of Python's own: each image asks for some thirty stamps, one by one.
+        """``(n, 3)``: each message's offset, its channel's number here, and its chunk's number."""
+        # An array of Python, because each image takes some thirty stamps, one by one.
         self._stamps = array("q", [UNREAD]) * len(table)
         self.delays: tuple[int, int] | None = None
-        """The least and the greatest time from stamp to log time, of those that were read."""
-        self._kept: dict[int, Message] = {}
-        self._kept_bytes = 0
+        """The least and the greatest time from stamp to log time, of the stamps read so far."""
+        self._cache: dict[int, Message] = {}
+        self._cached_bytes = 0
 
     def __len__(self) -> int:
         return len(self.log_times)
 
     def message(self, position: int) -> Message:
         """Read a message; a `FrameError` if it cannot be read."""
-        if position in self._kept:
-            return self._kept[position]
+        if position in self._cache:
+            return self._cache[position]
         message = self._read(position)
         if message is None and self._places[position, 2] != OUTSIDE:
             self._correct(position)
             message = self._read(position)
         if message is None:
             raise self._error(position, "no message where the index says")
-        if len(message.data) <= KEPT_BYTES >> 6:
-            # A copy: its own bytes hold the whole chunk in memory.
+        if len(message.data) <= CACHE >> 6:
+            # A copy, because a view of the data would hold its chunk in memory.
             message = message._replace(data=memoryview(bytes(message.data)))
-            self._kept[position] = message
-            self._kept_bytes += len(message.data)
-            while self._kept_bytes > KEPT_BYTES:
-                self._kept_bytes -= len(self._kept.pop(next(iter(self._kept))).data)
+            self._cache[position] = message
+            self._cached_bytes += len(message.data)
+            while self._cached_bytes > CACHE:
+                self._cached_bytes -= len(self._cache.pop(next(iter(self._cache))).data)
         return message
 
     def _read(self, position: int) -> Message | None:
@@ -252,7 +244,7 @@ class TopicReader:
             if source.container.is_bad(chunk):
                 raise LostMessageError(f"{self.name} message {position}: {error}") from error
             return None
-        # Times beyond those of int64 are negative in the table.
+        # Times beyond int64 are negative in the table.
         same_time = message.log_time == int(self.log_times[position]) % 2**64
         return message if same_time and message.channel_id == source.channel.id else None
 
@@ -279,11 +271,11 @@ class TopicReader:
             raise self._error(position, str(error)) from error
 
     def fields(self, position: int) -> Any:
-        """Read a message whatever it carries; a `FrameError` or `BadMessage` if that fails."""
+        """Read a message of any kind; a `FrameError` or `BadMessage` if that fails."""
         return self._decoder(position).fields(self.message(position).data)
 
     def stamp(self, position: int) -> int:
-        """Header stamp of a message in nanoseconds, or `UNREADABLE`."""
+        """Return the header stamp of a message in nanoseconds, or `UNREADABLE`."""
         stamp = self._stamps[position]
         if stamp == UNREAD:
             try:
@@ -291,7 +283,7 @@ class TopicReader:
                 stamp = self._decoder(position).stamp(data)
             except (FrameError, BadMessage):
                 stamp = UNREADABLE
-            if not UNREADABLE <= stamp < 2**63:  # no time that a table could hold
+            if not UNREADABLE <= stamp < 2**63:  # tables cannot hold it
                 stamp = UNREADABLE
             if stamp != UNREADABLE:
                 delay = int(self.log_times[position]) - stamp
@@ -301,7 +293,7 @@ class TopicReader:
         return stamp
 
     def knows(self, position: int) -> bool:
-        """Return whether the header stamp of a message was read before."""
+        """Return whether the header stamp of a message is read already."""
         return self._stamps[position] != UNREAD
 
     def frame_id(self, position: int) -> str:
@@ -312,27 +304,27 @@ class TopicReader:
             return ""
 
     def place(self, _position: int) -> str:
-        """Return where a message lies, for messages to people."""
+        """Return the place of a message, to show it to people."""
         return self.name
 
     def is_lost(self, position: int) -> bool:
-        """Return whether a message lies in a chunk that was found to be unreadable."""
+        """Return whether a message lies in a chunk that turned out to be unreadable."""
         _, number, chunk = self._places[position].tolist()
         return self.channels[number].container.is_bad(chunk)
 
     def chunks_of(self, positions: Sequence[int]) -> int:
-        """Count the chunks in which some messages lie; one outside of all counts for itself."""
+        """Count the chunks in which some messages lie; a message outside chunks counts as one."""
         places = self._places[np.asarray(positions, np.intp)]
         inside = places[places[:, 2] != OUTSIDE, 1:]
         return len(np.unique(inside, axis=0)) + len(places) - len(inside)
 
     def expected(self) -> int:
-        """Return how many messages there should be, by the files' own statistics."""
+        """Return the number of messages by the files' own statistics."""
         return sum(s.container.expected.get(s.channel.id, 0) for s in self.channels)
 
     @property
     def sure(self) -> int:
-        """How many messages, from the first one on, are certain to have their original positions.
+        """The number of messages, from the first one on, with certainly the recorded positions.
 
         Damage may have taken an unknown number of messages before the others.
         """
@@ -343,11 +335,11 @@ class TopicReader:
 
     @property
     def is_small(self) -> bool:
-        """Whether its files are read whole in a moment."""
+        """Whether its files can be read completely in a moment."""
         return sum(len(file.source) for file in self._files) <= SMALL
 
     def readable(self) -> int:
-        """Count the messages of the log, without those in chunks found to be damaged."""
+        """Count the messages outside damaged chunks."""
         chunks, counts = np.unique(self._places[:, 1:], axis=0, return_counts=True)
         is_bad = [self.channels[n].container.is_bad(chunk) for n, chunk in chunks.tolist()]
         return int(counts[~np.array(is_bad, bool)].sum())
@@ -363,10 +355,7 @@ class TopicReader:
 def topic_readers(
     containers: Sequence[Container], limits: Limits, *, lacks_files: bool
 ) -> dict[str, TopicReader]:
-    """Return a reader for each topic, over the channels that carry it in the files' order.
-
-    ``lacks_files`` says whether there are files of the log that cannot be read at all.
-    """
+    """Return a reader for each topic; ``lacks_files`` says whether files of the log are missing."""
     channels: dict[str, list[FileChannel]] = {}
     for container in containers:
         for channel_id, channel in sorted(container.channels.items()):

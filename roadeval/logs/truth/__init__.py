@@ -1,1 +1,1 @@
-"""Labels for a log's images, wherever they lie: what they mean, and which image each belongs to."""
+"""Labels for a log's images, in the log or beside it: their meaning, and the image of each."""

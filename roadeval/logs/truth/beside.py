@@ -14,90 +14,87 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 import numpy as np
 
-from roadeval.images.formats import ImageError, Limits
+from roadeval.images.formats import ImageError, Limits, Size
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.files import IMAGES, listed, of_ids, some
+from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import Drawing, LabelFormat, Meant, Size, settled
+from roadeval.logs.truth.drawn import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.logs.truth.names import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
 
 GREATEST: Final = 256 << 20
-"""Bytes of a file of labels."""
+"""Most bytes of a file of labels."""
 VALUES: Final = 20_000_000
-"""Numbers and texts in it."""
-_TRIED: Final = 8
-"""Files of an ending, of a folder, that are tried for a format."""
-_NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
-"""What a reader raises for a file that is not as its format asks."""
-_WRONG: Final = (*_NOT_SO, LogError, BadMessage, ImageError)
+"""Most numbers and texts in it."""
+_BAD_FORMAT: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
+"""Exceptions that a reader raises if a file breaks the rules of its format."""
+_UNREADABLE: Final = (*_BAD_FORMAT, LogError, BadMessage, ImageError)
 
 
 def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = None) -> LabelSet:
-    """List the labels in a folder or a file; of picked frames those in their folder of labels.
+    """List the labels in a folder or a file; for picked frames those in their folder of labels.
 
-    In a folder, files of an annotation tool come before images: these may be the ones that were
-    annotated. A folder without any of both, or with lists of names alone, is searched with all
-    below it. ``size`` is the width and height of the log's images, if known: some formats have
-    shares of it. What drawn shapes mean decides which is on top, and what can be left out. A
-    `LogError` if there is no label, or the file of labels cannot be read.
+    Files of an annotation tool come before images, which may be the annotated ones. If the folder
+    itself has no labels, the folders below it are searched. ``size`` is the width and height of the
+    log's images, if known: some formats have shares of it. The settings decide which shapes are on
+    top, and which may be left out. A `LogError` if there is no label, or a file cannot be read.
     """
     if (path / PICK).is_file():
         path /= LABELS
     if path.is_file() and path.suffix.lower() not in _formats():
         names = sorted({format_.name for formats in _formats().values() for format_ in formats})
-        known = ", ".join(names)
-        raise LogError(f"{path}: no file of labels; known are folders of images, and {known}")
+        listing = ", ".join(names)
+        raise LogError(f"{path}: no file of labels; known are folders of images, and {listing}")
     endings = IMAGES | {NPY} | _formats().keys()
-    files = [path] if path.is_file() else listed(path, endings, below=True)
+    files = [path] if path.is_file() else list_files(path, endings, below=True)
     problems: list[LogError] = []
     for some_files in ([file for file in files if path in (file, file.parent)], files):
-        labels = _labels_of(some_files, size, settings or MaskSettings(), problems)
+        labels = _find_labels(some_files, size, settings or MaskSettings(), problems)
         if labels is not None:
             return labels
     raise next(iter(problems), LogError(f"{path}: no label in it that roadeval can read"))
 
 
-def _labels_of(
+def _find_labels(
     files: Sequence[Path], size: Size | None, settings: MaskSettings, problems: list[LogError]
 ) -> LabelSet | None:
-    """Return the labels that some files hold; None if they hold none, with the problems of some."""
+    """Return the labels in some files; None if there are none. Adds to the ``problems``."""
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
-    with_ids = of_ids(images)
-    # Cityscapes has polygons beside the ids that were made of them.
-    for ending, known in _formats().items() if with_ids is images else ():
+    labels = prefer_ids(images)
+    # If Cityscapes' images of ids are there, the polygons that they were made of are left out.
+    for ending, format_list in _formats().items() if labels is images else ():
         of_ending = [file for file in files if file.suffix.lower() == ending]
         filled = (file for file in of_ending if file.is_file() and file.stat().st_size)
-        for file in islice(filled, _TRIED):
+        for file in islice(filled, 8):
             try:
-                content = _parsed(file)
+                content = _parse(file)
             except LogError as error:
                 problems.append(error)
                 continue
-            for format_ in known:
-                with suppress(*_NOT_SO):
+            for format_ in format_list:
+                with suppress(*_BAD_FORMAT):
                     if format_.holds(file, content):
-                        return _drawn(of_ending, {file: content}, format_, size, settings)
-            names = " or ".join(format_.name for format_ in known)
+                        return _read_drawn(of_ending, {file: content}, format_, size, settings)
+            names = " or ".join(format_.name for format_ in format_list)
             problems.append(LogError(f"{file}: not labels of {names}"))
-    return LabelSet(tuple(map(file_label, with_ids))) if with_ids else None
+    return LabelSet(tuple(map(file_label, labels))) if labels else None
 
 
 @cache
 def _formats() -> dict[str, list[LabelFormat]]:
-    """Return the formats by the endings of their files."""
+    """Return the label formats by the endings of their files."""
     by_ending: dict[str, list[LabelFormat]] = {}
-    for format_ in chain(*found_in(formats, "FORMATS")):
+    for format_ in chain(*collect(formats, "FORMATS")):
         by_ending.setdefault(format_.ending, []).append(format_)
     return by_ending
 
 
-def _parsed(file: Path) -> Any:
+def _parse(file: Path) -> Any:
     """Parse a file by its ending; a `LogError` if it is damaged, or beyond a limit."""
     try:
         content = read_bounded(file, GREATEST)
@@ -105,7 +102,7 @@ def _parsed(file: Path) -> Any:
             case ".json":
                 return read_json(content, VALUES, shown=False, most=GREATEST)
             case ".xml":
-                # Another encoding, 16 bits a letter among them, could hide these words.
+                # An encoding with 16 bits a letter, for example, could hide these words.
                 if any(word in content for word in (b"<!DOCTYPE", b"<!ENTITY", b"\0")):
                     raise ValueError("it defines entities, or is not in UTF-8")
                 return fromstring(content, XMLParser(encoding="utf-8"))
@@ -123,84 +120,89 @@ def _parsed(file: Path) -> Any:
         raise LogError(f"{file}: cannot be read as labels: {reason}") from error
 
 
-def _drawn(
+def _read_drawn(
     files: Sequence[Path],
     parsed: Mapping[Path, Any],
     format_: LabelFormat,
     size: Size | None,
     settings: MaskSettings,
 ) -> LabelSet:
-    """Return the labels of all files of a format, some parsed before; a `LogError` if none is."""
-    drawings, broken, others = _images_in(files, parsed, format_, size)
+    """Read the files of a format, of which some are parsed; a `LogError` if no label is in them."""
+    drawings, broken, others = _read_images(files, parsed, format_, size)
     notes = []
     lost = len(broken)
     labelled = [drawing for drawing in drawings if drawing.shapes]
     if others:
-        notes.append(f"{some(others)}: of another format than the other labels, not read")
-    if bare := len(drawings) - len(labelled):
-        notes.append(f"{bare} of {len(drawings)} images have no shape, and count as not labelled")
+        notes.append(f"{first_names(others)}: of another format than the other labels, not read")
+    if without := len(drawings) - len(labelled):
+        notes.append(
+            f"{without} of {len(drawings)} images have no shape, and count as not labelled"
+        )
     occurring = Counter(sorted(name for drawing in labelled for name in drawing.classes))
     road = settings.labels.road or (tuple(occurring) if len(occurring) == 1 else ())
     ignored = {*map(str, settings.labels.ignore)}
-    meant = Meant({*map(str, road)}, ignored, settings.skip_roadless)
-    labelled = settled(labelled, meant, broken, notes)
+    roles = ClassRoles({*map(str, road)}, ignored, settings.skip_roadless)
+    labelled = settle_shapes(labelled, roles, broken, notes)
     if not labelled:
         image, problem = next(iter(broken.items()), (files[0], f"{format_.name} without a shape"))
         where = "" if str(files[0]) == str(image) else f"{files[0]}: "
         raise LogError(f"{where}{image}: {problem}")
     classes = {name: value for value, name in enumerate(occurring, 1)}
-    labels = [_label(drawing, classes, format_) for drawing in labelled]
-    labels += [NamedLabel(Path(name), bytes, partial(_raise, why)) for name, why in broken.items()]
+    labels = [_named_label(drawing, classes, format_) for drawing in labelled]
+    labels += [
+        NamedLabel(Path(name), bytes, partial(_raise_problem, problem))
+        for name, problem in broken.items()
+    ]
     return LabelSet(labels, classes, occurring, lost, tuple(notes))
 
 
-def _images_in(
+def _read_images(
     files: Sequence[Path], parsed: Mapping[Path, Any], format_: LabelFormat, size: Size | None
-) -> tuple[list[Drawing], dict[str, str], list[str]]:
-    """Return the images in some files, those whose labels cannot be read, and files of others.
+) -> tuple[list[DrawnLabel], dict[str, str], list[str]]:
+    """Return the images in some files, the problems of broken ones, and files of other formats.
 
-    A file that cannot be read is such an image where each file has one; else a `LogError`.
+    If each file has one image, a damaged file is a broken image; else it is a `LogError`.
     """
-    drawings, broken, others = list[Drawing](), dict[str, str](), list[str]()
-    damaged, images_in = dict[Path, str](), Counter[Path]()
+    drawings, broken, others = list[DrawnLabel](), dict[str, str](), list[str]()
+    damaged, image_counts = dict[Path, str](), Counter[Path]()
     for file in files:
         try:
-            content = parsed[file] if file in parsed else _parsed(file)
+            content = parsed[file] if file in parsed else _parse(file)
             if not format_.holds(file, content):
                 others.append(file.name)
                 continue
             for drawing in format_.read(file, content, size):
-                images_in[file] += 1
+                image_counts[file] += 1
                 try:
-                    drawings.append(drawing.whole(size))
-                except _WRONG as error:
+                    drawings.append(drawing.complete(size))
+                except _UNREADABLE as error:
                     broken[drawing.image] = _in_words(error, format_)
-        except _WRONG as error:
+        except _UNREADABLE as error:
             damaged[file] = _in_words(error, format_).removeprefix(f"{file}: ")
     for file, problem in damaged.items():
-        if file in images_in or max(images_in.values(), default=0) > 1:
+        if file in image_counts or max(image_counts.values(), default=0) > 1:
             raise LogError(f"{file}: {problem}")
         broken[str(file)] = problem
     return drawings, broken, others
 
 
 def _in_words(error: Exception, format_: LabelFormat) -> str:
-    """Return what is wrong with a file, or with the label of an image."""
-    if not isinstance(error, _NOT_SO) or isinstance(error, ImageError):
+    """Return the problem of a file, or of the label of an image."""
+    if not isinstance(error, _BAD_FORMAT) or isinstance(error, ImageError):
         return str(error)
     lacking = f" (it has no {error})" if isinstance(error, KeyError) else ""
     return f"an annotation is not as {format_.name} writes it{lacking}"
 
 
-def _raise(problem: str, *_: Any) -> Picture:
+def _raise_problem(problem: str, *_: Any) -> Picture:
     raise BadMessage(problem)
 
 
-def _label(drawing: Drawing, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
+def _named_label(drawing: DrawnLabel, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
     def picture(_content: bytes, limits: Limits) -> Picture:
         try:
             pixels = drawing.pixels(classes, limits)
-        except _NOT_SO as error:
+        except _BAD_FORMAT as error:
             raise BadMessage(_in_words(error, format_)) from error
         height, width = pixels.shape
         data = pixels.astype("<u2").tobytes()
@@ -227,9 +229,9 @@ def file_label(file: Path) -> NamedLabel:
 def npy_picture(data: bytes, limits: Limits) -> RawPicture:
     """Return the ``(H, W)`` array of an NPY file as a picture of one channel.
 
-    Truth values and whole numbers keep their values, numbers with a fraction become float32.
-    Nothing in the file is run: an array of objects is refused. A `BadMessage` if it is no NPY file,
-    is cut off, or holds something else. An `ImageError` if it is larger than the limits allow.
+    Truth values and whole numbers keep their values, numbers with a fraction become float32. No
+    code in the file runs: an array of objects is refused. A `BadMessage` if it is no NPY file, is
+    cut off, or holds something else. An `ImageError` if it is larger than the limits allow.
     """
     try:
         array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)

@@ -1,9 +1,9 @@
 """Labels that annotation tools draw: outlines and runs of pixels, each with the name of a class.
 
-One rule turns an outline into pixels, whichever tool wrote it: a pixel belongs to it if the pixel's
-centre lies inside, by the even-odd rule; the corner of the image is at 0,0 and the centre of its
-first pixel at 0.5,0.5. Where shapes overlap, the later one covers the earlier one, and a class that
-is ignored covers all others.
+One rule turns outlines of all tools into pixels: a pixel belongs to an outline if its centre lies
+inside, by the even-odd rule; the corner of the image is at 0,0 and the centre of its first pixel at
+0.5,0.5. If shapes overlap, the later one covers the earlier one, and an ignored class covers all
+others.
 """
 
 from __future__ import annotations
@@ -22,21 +22,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.images.formats import Limits
+from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.files import some
+from roadeval.logs.files import first_names
 
 Mask = npt.NDArray[np.bool_]
-Size = tuple[int, int]
-"""Width and height in pixels."""
-FARTHEST: Final = 1e6
-"""Pixels from the image's corner at which a point may lie."""
 _CORNERS: Final = 90
 """Points of an ellipse."""
 
 
 @dataclass(frozen=True)
-class Meant:
+class ClassRoles:
     """The meaning of the classes of drawn labels, by the settings."""
 
     road: Set[str]
@@ -52,15 +48,15 @@ class Outline(NamedTuple):
     """``x, y, x, y, ...`` in pixels."""
 
     def fill(self, size: Size) -> Mask:
-        """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if it is no outline."""
+        """Return the ``(H, W)`` pixels of the area; a `BadMessage` if it is no outline."""
         points = self.points()
         filled = np.zeros(size[::-1], np.bool_)
-        # Its window of the image: pixels from the first to before the last.
+        # The part of the image around it: from the first pixel to before the last.
         left, top = np.clip(np.ceil(points.min(axis=0)), 0, size).astype(int).tolist()
         right, bottom = np.clip(np.floor(points.max(axis=0)) + 1, 0, size).astype(int).tolist()
         crossings = np.zeros((bottom - top, right - left + 1), np.bool_)
         for side in zip(points.tolist(), np.roll(points, -1, axis=0).tolist(), strict=True):
-            # In one direction, whichever of two outlines the side belongs to.
+            # Two outlines with a common side must compute it in the same direction.
             (x, y), (next_x, next_y) = sorted(side, key=itemgetter(1))
             first, end = np.ceil(np.clip((y, next_y), top, bottom)).astype(int)
             if first < end:
@@ -73,21 +69,21 @@ class Outline(NamedTuple):
         return filled
 
     def points(self) -> npt.NDArray[np.float64]:
-        """Return the ``(n, 2)`` points of the ring, from the centre of the first pixel."""
+        """Return the ``(n, 2)`` points of the ring, relative to the centre of the first pixel."""
         try:
-            flat = np.asarray(self.ring, np.float64)
+            ring = np.asarray(self.ring, np.float64)
         except (TypeError, ValueError, OverflowError):
-            flat = np.array(np.nan)
-        if flat.ndim != 1 or not flat.size or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
+            ring = np.array(np.nan)
+        if ring.ndim != 1 or not ring.size or len(ring) % 2 or not (np.abs(ring) <= 1e6).all():
             raise BadMessage(f"an outline of {self.label} whose points are no pixels")
-        return flat.reshape(-1, 2) - 0.5
+        return ring.reshape(-1, 2) - 0.5
 
-    def turned(self, degrees: float, about: tuple[float, float]) -> Outline:
-        """Return the outline turned clockwise, as seen in the image, about a point in pixels."""
+    def rotate(self, degrees: float, about: tuple[float, float]) -> Outline:
+        """Return the outline rotated clockwise, as seen in the image, about a point in pixels."""
         cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
         points = np.reshape(self.ring, (-1, 2)) - about
-        turned = points @ np.array([[cosine, sine], [-sine, cosine]]) + about
-        return self._replace(ring=turned.ravel().tolist()) if degrees else self
+        rotated = points @ np.array([[cosine, sine], [-sine, cosine]]) + about
+        return self._replace(ring=rotated.ravel().tolist()) if degrees else self
 
 
 def rectangle(label: str, left: float, top: float, right: float, bottom: float) -> Outline:
@@ -105,27 +101,27 @@ def ellipse(label: str, x: float, y: float, across: float, down: float) -> Outli
 
 
 def hull(label: str, ring: Sequence[float]) -> Outline:
-    """Return the outline around points: what a cuboid covers, given its corners in the image."""
+    """Return the convex outline around points, such as the corners of a cuboid in the image."""
     import cv2
 
     points = np.reshape(np.asarray(ring, np.float32), (-1, 2))
     return Outline(label, cv2.convexHull(points).ravel().tolist())
 
 
-def flat(points: Iterable[Iterable[float]]) -> list[float]:
+def flatten(points: Iterable[Iterable[float]]) -> list[float]:
     """Return ``x, y, x, y, ...`` of points."""
     return [float(number) for x, y in points for number in (x, y)]
 
 
 def size_in(stated: Mapping[str, Any], width: str = "width", height: str = "height") -> Size | None:
-    """Return the size that a part of a file states under two names; None if it states none."""
+    """Return the size that a table states under two names; None if it states none."""
     with suppress(KeyError, TypeError, ValueError, OverflowError):
         return int(stated[width]), int(stated[height])
     return None
 
 
 class Runs(NamedTuple):
-    """An area of runs of pixels, alternately outside and inside of it, in a box of the image."""
+    """An area of runs of pixels, alternately outside and inside, in a box of the image."""
 
     label: str
     lengths: Sequence[int]
@@ -135,7 +131,7 @@ class Runs(NamedTuple):
     """Whether the runs go down the columns instead of along the rows."""
 
     def fill(self, size: Size) -> Mask:
-        """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if the runs do not fit."""
+        """Return the ``(H, W)`` pixels of the area; a `BadMessage` if the runs do not fit."""
         left, top, width, height = self.box or (0, 0, *size)
         try:
             lengths = np.asarray(self.lengths, np.int64)
@@ -143,7 +139,7 @@ class Runs(NamedTuple):
             lengths = np.array([-1])
         fits = left + width <= size[0] and top + height <= size[1]
         fits = fits and min(left, top, width, height, lengths.min(initial=0)) >= 0
-        # Lengths that are too great could add up to the same number by overflow.
+        # Too great lengths could overflow to the right sum.
         fits = fits and lengths.max(initial=0) <= width * height
         if not fits or lengths.sum() != width * height:
             raise BadMessage(f"a mask of {self.label} that does not fit its image")
@@ -156,45 +152,45 @@ class Runs(NamedTuple):
 
 
 class Undrawn(NamedTuple):
-    """A shape whose pixels are not known.
+    """A shape with unknown pixels.
 
-    It costs its image if its class is road, or is ignored and the shape has no box; the box of
-    another ignored one is ignored. Of other classes it is left out, which is said.
+    If its class is ignored, its box stands for it. Its image is lost if its class is road, or is
+    ignored and the shape has no box. A shape of another class is left out with a note.
     """
 
     label: str
     what: str
-    """Its kind, for a person: what comes after "a" or a number."""
+    """Its kind, in words that follow "a" or a number."""
     box: Outline | None = None
-    """The box that holds it, if that is known."""
+    """The box around it, if known."""
 
     def fill(self, size: Size) -> Mask:
-        """Return the ``(H, W)`` pixels of its box; none if that is not known."""
+        """Return the ``(H, W)`` pixels of its box, or none."""
         return np.zeros(size[::-1], np.bool_) if self.box is None else self.box.fill(size)
 
-    def is_box_of(self, meant: Meant) -> bool:
-        """Return whether its box stands for it: that of a class that is ignored."""
-        return self.box is not None and self.label in meant.ignored
+    def is_replaced(self, roles: ClassRoles) -> bool:
+        """Return whether its box stands for it."""
+        return self.box is not None and self.label in roles.ignored
 
 
 Shape = Outline | Runs | Undrawn
 
 
 @dataclass(frozen=True)
-class Drawing:
+class DrawnLabel:
     """The shapes on one image."""
 
     image: str
     """The name of the image's file, or a text that ends with the number of its frame."""
     size: Size | None
-    """Size of the image; None if the format does not say, and the log's images have it."""
+    """Size of the image; None if the format does not state it."""
     shapes: Iterable[Shape]
-    """They are run through once. An error while they are costs this image, and no other."""
+    """Its shapes, perhaps an iterator: an error while it runs loses this image only."""
 
-    def whole(self, size: Size | None) -> Drawing:
-        """Return it with all its shapes, of the log's size where it has none.
+    def complete(self, size: Size | None) -> DrawnLabel:
+        """Return the label with all its shapes, and with this size if it has none.
 
-        Raises what the format does, and a `BadMessage` if a shape has no class.
+        Raises the errors of the format, and a `BadMessage` if a shape has no class.
         """
         shapes = tuple(self.shapes)
         if any(not shape.label or not isinstance(shape.label, str) for shape in shapes):
@@ -207,25 +203,25 @@ class Drawing:
         return {shape.label for shape in self.shapes}
 
     def content(self) -> bytes:
-        """Return all that decides its pixels."""
+        """Return the bytes that determine its pixels."""
         return json.dumps([self.size, [*self.shapes]]).encode()
 
     def pixels(self, values: Mapping[str, int], limits: Limits) -> npt.NDArray[np.uint16]:
         """Return the ``(H, W)`` values of the classes, 0 where no shape is.
 
-        A `BadMessage` if a shape does not fit the image, or the size of that is not known.
+        A `BadMessage` if a shape does not fit the image, or the size of the image is unknown.
         """
         if self.size is None:
             raise BadMessage("neither the label nor the log says how large the image is")
         limits.check(*self.size)
-        painted = np.zeros(self.size[::-1], np.uint16)
+        pixels = np.zeros(self.size[::-1], np.uint16)
         for shape in self.shapes:
-            painted[shape.fill(self.size)] = values[shape.label]
-        return painted
+            pixels[shape.fill(self.size)] = values[shape.label]
+        return pixels
 
 
 class Proposal(NamedTuple):
-    """A mask that an annotator is to correct."""
+    """A mask for an annotator to correct."""
 
     image: str
     """The name of the image's file."""
@@ -240,24 +236,24 @@ class Proposal(NamedTuple):
 
     def runs(self, *, by_columns: bool = False) -> list[int]:
         """Return the lengths of its runs, alternately outside and inside, the first outside."""
-        flat = self.road.T.ravel() if by_columns else self.road.ravel()
-        changes = np.flatnonzero(np.diff(flat, prepend=False))
-        lengths: list[int] = np.diff(changes, prepend=0, append=flat.size).tolist()
+        pixels = self.road.T.ravel() if by_columns else self.road.ravel()
+        changes = np.flatnonzero(np.diff(pixels, prepend=False))
+        lengths: list[int] = np.diff(changes, prepend=0, append=pixels.size).tolist()
         return lengths
 
 
-def painted(label: str, pixels: Mask, left: int = 0, top: int = 0) -> Runs:
-    """Return the area of a mask whose first pixel has this place in the image."""
+def runs_of(label: str, pixels: Mask, left: int = 0, top: int = 0) -> Runs:
+    """Return the area of a mask with its first pixel at this place in the image."""
     area = Proposal("", pixels)
     return Runs(label, area.runs(), (left, top, *area.size))
 
 
 @dataclass(frozen=True)
 class LabelFormat:
-    """A kind of files that hold labels.
+    """A format of files with labels.
 
-    `roadeval.logs.truth.beside` parses a file once by its ending: ``.json`` to lists and dicts,
-    ``.xml`` to its root element, ``.txt`` to a text.
+    `roadeval.logs.truth.beside` parses a file by its ending: ``.json`` to lists and dicts, ``.xml``
+    to its root element, ``.txt`` to a text.
     """
 
     name: str
@@ -265,34 +261,38 @@ class LabelFormat:
     """The ending of its files, in lower case."""
     holds: Callable[[Path, Any], bool]
     """Whether a parsed file is of this format."""
-    read: Callable[[Path, Any, Size | None], Iterable[Drawing]]
+    read: Callable[[Path, Any, Size | None], Iterable[DrawnLabel]]
     """Return the label of each image in a parsed file of this format, given the size of the log's
-    images. A `LogError` or `BadMessage` says what cannot be used; a KeyError, TypeError or
-    ValueError means that the file, or the image, is not as the format asks."""
+    images. A `LogError` or `BadMessage` describes a label that cannot be used; a KeyError,
+    TypeError or ValueError means that the file, or the image, breaks the rules of the format."""
 
 
-def has(*keys: str) -> Callable[[Path, Any], bool]:
-    """Return what tells a file whose content is a table with these keys, among others."""
+def has_keys(*keys: str) -> Callable[[Path, Any], bool]:
+    """Return a function that tells whether the content of a file is a table with these keys."""
     return lambda _, content: isinstance(content, dict) and {*keys} <= content.keys()
 
 
-def settled(
-    drawings: Sequence[Drawing], meant: Meant, broken: dict[str, str], notes: list[str]
-) -> list[Drawing]:
-    """Return the images whose shapes are known, ignored ones on top.
+def settle_shapes(
+    drawings: Sequence[DrawnLabel], roles: ClassRoles, broken: dict[str, str], notes: list[str]
+) -> list[DrawnLabel]:
+    """Return the images with the shapes that count, ignored ones on top.
 
-    Images that are lost for a shape are added to the ``broken`` ones, with the reason, and
-    warnings, a sentence each, to the ``notes``.
+    Images that are lost are added to the ``broken`` ones, with the reason, and warnings, a sentence
+    each, to the ``notes``.
     """
-    whole: list[Drawing] = []
+    usable: list[DrawnLabel] = []
     for drawing in drawings:
-        unknown = [s for s in drawing.shapes if isinstance(s, Undrawn) and not s.is_box_of(meant)]
-        if lost := [s for s in unknown if s.label in meant.road | meant.ignored]:
+        filled, unknown = list[Shape](), list[Undrawn]()
+        for shape in drawing.shapes:
+            if isinstance(shape, Undrawn) and not shape.is_replaced(roles):
+                unknown.append(shape)
+            else:
+                filled.append(shape)
+        if lost := [shape for shape in unknown if shape.label in roles.road | roles.ignored]:
             broken[drawing.image] = f"{lost[0].label} is drawn as a {lost[0].what}"
             continue
-        filled = [s for s in drawing.shapes if not isinstance(s, Undrawn) or s.is_box_of(meant)]
-        filled.sort(key=lambda shape: shape.label in meant.ignored)
-        whole.append(replace(drawing, shapes=tuple(filled)))
+        filled.sort(key=lambda shape: shape.label in roles.ignored)
+        usable.append(replace(drawing, shapes=tuple(filled)))
     shapes = [shape for drawing in drawings for shape in drawing.shapes]
     for what, is_ignored in (
         ("not drawn: where they lie on the road, it counts as road", False),
@@ -301,61 +301,55 @@ def settled(
         kinds = Counter(
             f"{shape.label} ({shape.what})"
             for shape in shapes
-            if isinstance(shape, Undrawn) and shape.label not in meant.road
-            if (shape.label in meant.ignored) is is_ignored
+            if isinstance(shape, Undrawn) and shape.label not in roles.road
+            if (shape.label in roles.ignored) is is_ignored
         )
         if kinds:
-            named = ", ".join(f"{count} of {kind}" for kind, count in kinds.most_common())
-            notes.append(f"{kinds.total()} of {len(shapes)} shapes are {what}: {named}")
-    without = [d.image for d in whole if meant.road.isdisjoint(d.classes)]
-    if without and meant.road:
-        counted = "left out" if meant.skip_roadless else "counted as images without road"
-        advice = "" if meant.skip_roadless else "; `truth.skip_roadless` leaves them out"
+            listing = ", ".join(f"{count} of {kind}" for kind, count in kinds.most_common())
+            notes.append(f"{kinds.total()} of {len(shapes)} shapes are {what}: {listing}")
+    without = [drawing.image for drawing in usable if roles.road.isdisjoint(drawing.classes)]
+    if without and roles.road:
+        counted = "left out" if roles.skip_roadless else "counted as images without road"
+        advice = "" if roles.skip_roadless else "; `truth.skip_roadless` leaves them out"
         notes.append(
             f"{len(without)} of {len(drawings)} images have shapes, but none of road, and are "
-            f"{counted} ({some(without)}){advice}"
+            f"{counted} ({first_names(without)}){advice}"
         )
-        # Where no image has road its class is named wrongly, which is told later.
-        if meant.skip_roadless and len(without) < len(whole):
-            whole = [d for d in whole if not meant.road.isdisjoint(d.classes)]
-    notes += _hidden(whole, meant)
-    return whole
+        # If no image has road, the class of road is named wrongly, which is reported later.
+        if roles.skip_roadless and len(without) < len(usable):
+            usable = [d for d in usable if not roles.road.isdisjoint(d.classes)]
+    notes += _find_hidden_shapes(usable, roles)
+    return usable
 
 
-LOOKED_AT: Final = 20
-PIXELS: Final = 20_000_000
-"""Images, or pixels if these are more, in which overlaps are looked for, spread over all."""
-TOUCHING: Final = 0.005
-"""Share of the road's pixels that may cover another shape without a word: outlines that touch."""
-
-
-def _hidden(drawings: Sequence[Drawing], meant: Meant) -> Iterator[str]:
-    """Yield a warning where road covers earlier shapes of other classes, which count as road."""
+def _find_hidden_shapes(drawings: Sequence[DrawnLabel], roles: ClassRoles) -> Iterator[str]:
+    """Yield a warning if road covers earlier shapes of other classes, which then count as road."""
     crossed = []
     for drawing in drawings:
-        labels = [shape.label for shape in drawing.shapes if shape.label not in meant.ignored]
-        if not meant.road.isdisjoint(dropwhile(meant.road.__contains__, labels)):
+        labels = [shape.label for shape in drawing.shapes if shape.label not in roles.ignored]
+        if not roles.road.isdisjoint(dropwhile(roles.road.__contains__, labels)):
             crossed.append(drawing)
     area = max((math.prod(drawing.size or (1, 1)) for drawing in crossed), default=1)
-    looked = crossed[:: -(-len(crossed) // max(LOOKED_AT, PIXELS // max(area, 1))) or 1]
+    # Twenty images are looked at, or more if they have few pixels, spread over all.
+    sample = crossed[:: -(-len(crossed) // max(20, 20_000_000 // max(area, 1))) or 1]
     shares, classes = list[float](), Counter[str]()
-    for drawing in looked:
+    for drawing in sample:
         names = ["", *drawing.classes]
         values = {name: value for value, name in enumerate(names)}
-        road = [values[name] for name in names if name in meant.road]
-        below = sorted(drawing.shapes, key=lambda shape: shape.label not in meant.road)
+        road = [values[name] for name in names if name in roles.road]
+        below = sorted(drawing.shapes, key=lambda shape: shape.label not in roles.road)
         with suppress(BadMessage, ValueError, TypeError, OverflowError):
             top = drawing.pixels(values, Limits())
             under = replace(drawing, shapes=below).pixels(values, Limits())
             is_road = np.isin(top, road)
             hidden = under[is_road & ~np.isin(under, road)]
-            if len(hidden) > TOUCHING * np.count_nonzero(is_road):
+            if len(hidden) > 0.005 * np.count_nonzero(is_road):  # less is outlines that touch
                 shares.append(len(hidden) / np.count_nonzero(is_road))
                 classes.update(names[value] for value in np.unique(hidden).tolist())
     if shares:
         images = f"{len(drawings)} images"
-        if len(looked) < len(crossed):
-            images = f"{len(looked)} images that were looked at"
+        if len(sample) < len(crossed):
+            images = f"{len(sample)} images that were looked at"
         yield (
             f"road was drawn over {', '.join(name for name, _ in classes.most_common())} in "
             f"{len(shares)} of {images}: {100 * np.mean(shares):.1f} % of the road's pixels "

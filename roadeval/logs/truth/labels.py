@@ -1,6 +1,6 @@
-"""Labels of one source, settled before the first frame: where they lie, and what they mean.
+"""The meaning of the labels of one source, which is settled before the first frame.
 
-Values, colours or confidences of label pictures become truth.
+It turns values, colours or confidences of label pictures into truth.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Rgb, Truth
 from roadeval.data.words import counted
-from roadeval.images.formats import Limits
+from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
@@ -49,16 +49,14 @@ from roadeval.logs.truth.pairing import (
 )
 
 UNKNOWN: Final = 254
-"""Marks a value whose meaning is not known."""
+"""Stands for the truth of a value with unknown meaning."""
 TOP: Final = np.iinfo(np.uint16).max
 """The code of a confidence of 1."""
 LEAST: Final = np.iinfo(np.int16).min
-"""The least label value that is told from others: any below counts as it."""
+"""The least label value; values below count as this one."""
 NO_LABEL: Final = "values below 0 mean no label, and are ignored"
 _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
-"""Masks that need no settings: what their values mean."""
-BLURRED: Final = 48
-"""How far JPEG may move the levels of a mask of 0 and 255."""
+"""The values of masks that need no settings, and their meaning."""
 TWO_KINDS: Final = (
     "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road with "
     "`labels.road`, both where both do"
@@ -66,12 +64,8 @@ TWO_KINDS: Final = (
 NAME_THEM: Final = (
     "name those that mean road with `labels.road`, and those to leave out with `labels.ignore`"
 )
-ALONE: Final = "road"
-"""The class that means road where labels have no other."""
-FIRST_CHUNKS: Final = 2
-"""Chunks of a large log in which its first labels are looked at."""
 RARE: Final = 0.05
-"""Share of the labelled pixels below which what was named is hardly the road before a vehicle."""
+"""A smaller share of the labelled pixels is hardly the road before a vehicle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +85,16 @@ class ClassMap:
     meaning: Mapping[int, int]
     """Truth by label value, or by packed colour (`pack_colors`)."""
     others: int
-    """Truth of any other value. With `UNKNOWN` such a value is an error where it occurs."""
+    """Truth of any other value; `UNKNOWN` if such a value is an error."""
     by_color: bool
     """Whether colours are looked up instead of values."""
     words: str
     notes: tuple[str, ...] = ()
-    """Doubts about it, a sentence each."""
+    """Doubts about the meaning, a sentence each."""
 
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
-        """``(98304,)`` truth by label value; those below 0 lie at the end, as Python counts."""
+        """``(98304,)`` truth by label value; negative values index from the end."""
         table = np.full(TOP + 1 - LEAST, self.others, np.uint8)
         table[LEAST:] = IGNORE
         for value, truth in self.meaning.items():
@@ -110,8 +104,8 @@ class ClassMap:
     def read(self, picture: Picture, limits: Limits) -> Labels:
         """Decode a label picture.
 
-        A `BadMessage` if it cannot be decoded, or holds an unknown value, or colours instead of
-        values; or is compressed in a way that changes values.
+        A `BadMessage` if it cannot be decoded, has an unknown value, has colours instead of values,
+        or is compressed with loss.
         """
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes label values")
@@ -147,30 +141,30 @@ class ClassMap:
 
 @dataclass(frozen=True)
 class Confidence:
-    """Confidence maps: road is what has at least the ``threshold``, from 0 to 1."""
+    """Confidence maps: road has at least the ``threshold``, from 0 to 1."""
 
     threshold: float
     notes: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
-        """The meaning in words."""
+        """The meaning, in words."""
         return f"a confidence map: road is {self.threshold:g} or more"
 
     def road(self, probability: Probability) -> Mask:
-        """Return the road of ``(H, W)`` uint16 codes."""
+        """Return the road mask of ``(H, W)`` uint16 codes."""
         return (probability >= self.threshold * TOP).astype(np.uint8)
 
     def read(self, picture: Picture, limits: Limits) -> Labels:
-        """Decode a confidence map; errors as of `codes`."""
+        """Decode a confidence map; errors as in `codes`."""
         probability = self.codes(picture, limits)
         return Labels(self.road(probability), probability=probability)
 
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
 
-        A `BadMessage` if it cannot be decoded, holds colours or a number beyond 0..1, or is
-        compressed in a way that changes values.
+        A `BadMessage` if it cannot be decoded, has colours or a number beyond 0..1, or is
+        compressed with loss.
         """
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes confidences")
@@ -182,25 +176,24 @@ class Confidence:
         levels = to_labels(picture, limits)
         if levels.ndim != 2 or levels.dtype.kind == "i":
             raise BadMessage("it holds colours or signed numbers, not confidences")
-        # 257 times 255 is 65535.
-        return levels.astype(np.uint16) * 257 if levels.dtype == np.uint8 else levels
+        return levels.astype(np.uint16) * (TOP // 255) if levels.dtype == np.uint8 else levels
 
 
 Meaning = ClassMap | Confidence
-"""How label pictures of one source are read."""
+"""The meaning of the label pictures of one source."""
 
 
-def seen_in(
+def count_values(
     picture: Picture, labels: LabelSettings, name: str, limits: Limits, file: Path | None = None
 ) -> Mapping[int, int]:
-    """Return the values, or packed colours, of a label picture, and how many pixels have each.
+    """Count the pixels of each value, or of each packed colour, of a label picture.
 
-    ``file`` is its own, if it has one. A `BadMessage` if it cannot be decoded. A `LogError` if it
-    holds colours, and values are looked for; or is compressed in a way that changes values.
+    ``file`` is the picture's own file, if any. A `BadMessage` if it cannot be decoded. A `LogError`
+    if it has colours, but the settings name none, or if it is compressed with loss.
     """
     if format_ := lossy_format(picture):
         if file is not None and labels == LabelSettings() and _is_blurred(to_rgb(picture, limits)):
-            command = f"mkdir png && python -c '{_MENDING % file.suffix}' {shlex.quote(name)}"
+            command = f"mkdir png && python -c '{_REPAIR % file.suffix}' {shlex.quote(name)}"
             reason = "holds masks whose compression blurs their edges; make a new folder"
             raise LogError(f"{name} {reason}: {command}")
         raise LogError(lossy_labels(name, format_))
@@ -216,26 +209,26 @@ def seen_in(
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
 
-_MENDING: Final = (
+_REPAIR: Final = (
     'import cv2, pathlib, sys; [cv2.imwrite(f"png/{f.stem}.png", cv2.threshold(cv2.imread(str(f), '
     '0), 127, 255, 0)[1]) for f in pathlib.Path(sys.argv[1]).rglob("*%s")]'
 )
 
 
 def _is_blurred(colours: Rgb) -> bool:
-    """Whether an image is a mask of black and white, but for levels between them at its edges."""
-    levels = colours[..., 0]
-    is_grey = np.ptp(colours.astype(np.int16), axis=2).max() <= BLURRED
-    is_white = levels >= 255 - BLURRED
-    return bool(is_grey and is_white.any() and np.mean((levels > BLURRED) & ~is_white) <= RARE)
+    """Return whether an image is a mask of black and white with blurred edges."""
+    levels, most = colours[..., 0], 48  # JPEG may move the levels so far
+    is_grey = np.ptp(colours.astype(np.int16), axis=2).max() <= most
+    is_white = levels >= 255 - most
+    return bool(is_grey and is_white.any() and np.mean((levels > most) & ~is_white) <= RARE)
 
 
 def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name: str) -> ClassMap:
-    """Decide what the values of label pictures mean.
+    """Find the meaning of the values of label pictures.
 
-    ``pictures`` are the values, or packed colours, that occur in each of some pictures. A
-    `LogError` if a value that is named does not occur, or none is named and the values are class
-    ids, or do not mean the same in all pictures.
+    ``pictures`` are the values, or packed colours, of each of some pictures. A `LogError` if a
+    named value does not occur; or if none is named, and the values are class ids or have different
+    meanings in different pictures.
     """
     values = sorted({value for picture in pictures for value in picture})
     has_negatives, remedy = values[:1] < [0], NAME_THEM
@@ -243,7 +236,7 @@ def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name:
         codes = {value: value for value in values}
         there = f"{name}, whose frames hold "
         if labels.road_colors:
-            names = (map(_packed, labels.road_colors), map(_packed, labels.ignore_colors))
+            names = (map(_pack_color, labels.road_colors), map(_pack_color, labels.ignore_colors))
             there += _listed(map(_color_name, values))
             return _as_named(*names, codes, there, text=_color_name, ending="_colors")
         meaning = _as_named(labels.road, labels.ignore, codes, there + _listed(map(str, values)))
@@ -262,20 +255,20 @@ def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name:
     raise LogError(f"{name} holds the values {_listed(map(str, values))}: {remedy}")
 
 
-def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
-    """Return the meaning of drawn labels, whose classes have names.
+def understand_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
+    """Find the meaning of drawn labels by the names of their classes.
 
-    A lone class called road needs no naming. A `LogError` if no class is named that means road, or
-    one that does not occur.
+    If the only class is called road, it means road. A `LogError` if the settings name no class of
+    road, or one that does not occur.
     """
     classes = origin.classes
-    road = labels.road or ((ALONE,) if {*classes} == {ALONE} else ())
+    road = labels.road or (("road",) if {*classes} == {"road"} else ())
     there = _counted(origin, classes)
     if not road:
         raise LogError(f"{name} has the classes {there}: {NAME_THEM}")
     if origin.lost:
         there += f"; {counted(origin.lost, 'label')} of it cannot be read"
-    # A class may be called 7.
+    # The name of a class may be a number.
     names = map(str, road), map(str, labels.ignore)
     meaning = _as_named(*names, classes, f"{name}, which has the classes {there}")
     rest = [label for label in classes if classes[label] not in meaning.meaning]
@@ -292,16 +285,16 @@ def _as_named(
     text: Callable[[Any], str] = str,
     ending: str = "",
 ) -> ClassMap:
-    """Return the meaning of values, colours or classes of which some are named.
+    """Return the meaning of values, colours or classes, some of which are named.
 
-    ``codes`` has the value of each that occurs, ``there`` says of whom and which; ``ending`` is
-    that of the settings' names. A `LogError` if one that is named does not occur.
+    ``codes`` are the values of those that occur, ``there`` lists them in words; ``ending`` ends the
+    names of the settings. A `LogError` if a named one does not occur.
     """
     meaning: dict[int, int] = {}
     words: list[list[str]] = []
-    for setting, named, truth in (("road", road, ROAD), ("ignore", ignored, IGNORE)):
+    for setting, names, truth in (("road", road, ROAD), ("ignore", ignored, IGNORE)):
         words.append([])
-        for name in named:
+        for name in names:
             if name not in codes:
                 raise LogError(f"`labels.{setting}{ending}` {text(name)} does not occur in {there}")
             meaning[codes[name]] = truth
@@ -310,19 +303,19 @@ def _as_named(
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
-    """Name the most usual of some classes, each with the number of labels in which it occurs."""
+    """List the most usual of some classes, with the number of labels in which each occurs."""
     usual = sorted(classes, key=lambda name: -origin.occurring[name])
     shown = [f"{name} ({counted(origin.occurring[name], 'label')})" for name in usual[:limit]]
     return ", ".join(shown) + (f", and {len(usual) - limit} more" if len(usual) > limit else "")
 
 
 def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
-    """``(H, W)`` numbers for ``(H, W, 3)`` colours: red * 65536 + green * 256 + blue."""
+    """Return ``(H, W)`` numbers, red * 65536 + green * 256 + blue, for ``(H, W, 3)`` colours."""
     wide = colors.astype(np.uint32)
     return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
 
 
-def _packed(color: Color) -> int:
+def _pack_color(color: Color) -> int:
     return color[0] << 16 | color[1] << 8 | color[2]
 
 
@@ -336,13 +329,13 @@ def _words(road: Iterable[str], ignored: Iterable[str]) -> str:
 
 
 def _listed(names: Iterable[str], limit: int = 16) -> str:
-    """Return names in a row, the first ones where there are many."""
+    """Join names with blanks, the first ones if there are many."""
     shown = list(names)
     return " ".join(shown[:limit] + ["..."] * (len(shown) > limit))
 
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
-"""A letter alone before the colon is a disk's."""
+"""A path of a log and a topic; a single letter before the colon is a disk's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,30 +343,30 @@ class LabelSource:
     """Labels of one source: truth, true shadow, or another method's masks."""
 
     where: str
-    """The topic, the folder, or the topic and its log, for a person."""
+    """The topic, the folder, or the topic and its log, in words."""
     pictures: LabelPictures
     meaning: Meaning
     pairing: Pairing
     why: str
     """Why they were chosen, or how they are paired, in words."""
     digest: Callable[[], str] | None = None
-    """Computes the digest of what lies beside the log, in hexadecimal."""
+    """Computes the digest in hexadecimal of labels beside the log."""
     notes: tuple[str, ...] = ()
     """Warnings about labels beside the log, a sentence each."""
 
     @property
     def is_confidence(self) -> bool:
-        """Whether they are thresholds on how probable road is."""
+        """Whether they are probabilities of road, from which a threshold makes masks."""
         return isinstance(self.meaning, Confidence)
 
     def partners(self, logged_ns: int, *, few: bool = False) -> Partners:
-        """Pair images, perhaps only a few, with labels, beginning at an image of that log time."""
+        """Begin to pair images, perhaps only a few, at an image with this log time."""
         near = int(np.searchsorted(self.pictures.log_times, logged_ns))
         return Partners(self.pairing, near, few=few)
 
 
 def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameError:
-    """Return a picture, or the error if it cannot be read."""
+    """Return a picture, or the error of reading it."""
     try:
         return pictures.picture(position)
     except FrameError as error:
@@ -381,23 +374,23 @@ def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameEr
 
 
 def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
-    """Read the first pictures, and some spread over the rest, as far as they can be read.
+    """Read the first pictures and some spread over the rest; yield them with their positions.
 
-    Each comes with its position.
+    Unreadable ones are left out. The first ones of a large log lie in at most two chunks.
     """
     count = len(pictures)
     first = range(min(LOOKED_AT, count))
     if isinstance(pictures, TopicReader) and not pictures.is_small:
-        first = first[: sum(pictures.chunks_of(first[: n + 1]) <= FIRST_CHUNKS for n in first)]
+        first = first[: sum(pictures.chunks_of(first[: n + 1]) <= 2 for n in first)]
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
     for position in sorted({*first, *spread}):
         with suppress(FrameError):
             picture = pictures.picture(position)
-            pictures.stamp(position)  # now or never is known how late labels are logged
+            pictures.stamp(position)  # this shows how late labels are logged
             yield position, picture
 
 
-def beside_log(
+def source_beside_log(
     labels: LabelPictures,
     settings: MaskSettings,
     camera: Camera,
@@ -406,11 +399,9 @@ def beside_log(
     *,
     offset_ms: float = 0.0,
 ) -> LabelSource:
-    """Settle labels that have names, or those of a topic of another ``log``.
+    """Settle labels with names, or of a topic of another ``log``; the offset delays their stamps.
 
-    The offset is added to their stamps.
-
-    A `LogError` if none belongs to a frame, they cannot be understood, or are of another size.
+    A `LogError` if none belongs to a frame, or they have another size or no clear meaning.
     """
     notes: tuple[str, ...] = ()
     if isinstance(labels, NamedLabels):
@@ -436,7 +427,7 @@ def beside_log(
 
 
 def log_and_topic(path: str) -> tuple[str | None, str | None]:
-    """Return the log and the topic that a path of labels names; no log for a folder or a file.
+    """Return the log and the topic in a path of labels; no log for a folder or a file.
 
     >>> log_and_topic("night/masks.mcap:/net/road")
     ('night/masks.mcap', '/net/road')
@@ -447,9 +438,9 @@ def log_and_topic(path: str) -> tuple[str | None, str | None]:
 
 
 def label_files(settings: LabelPlace) -> list[Path]:
-    """Return the files that hold labels, or give them their frames, even if they do not exist.
+    """Return the files with labels, and the images that give them their frames.
 
-    An OSError if a folder cannot be listed.
+    They need not exist. An OSError if a folder cannot be listed.
     """
     paths = [Path(log_and_topic(settings.path)[0] or settings.path)]
     paths += [] if settings.images is None else [Path(settings.images)]
@@ -457,13 +448,10 @@ def label_files(settings: LabelPlace) -> list[Path]:
     return [*filter(is_shown, files)]
 
 
-Size = tuple[int, int]
-
-
 def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bool) -> str:
-    """Return what is wrong with a label of another size than its image; empty where it is scaled.
+    """Return the problem of a label with another size than its image; empty if it is scaled.
 
-    Where width and height are exchanged one of both is turned, and scaling would hide that.
+    If width and height are exchanged, one of both is turned, and scaling would hide that.
     """
     is_turned = theirs[0] * ours[0] == theirs[1] * ours[1] and theirs[0] != theirs[1]
     if theirs == ours or (resize and not is_turned):
@@ -480,7 +468,7 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
 def check_size(
     size: Size | None, labels: LabelPictures, position: int, camera: Camera, pairing: Pairing
 ) -> None:
-    """Refuse a label of another size than its own image, unless they are resized; a `LogError`."""
+    """Raise a `LogError` if a label has another size than its image, and labels are not scaled."""
     expected = camera.topic.size
     if size is None or expected is None or size == expected:
         return
@@ -493,7 +481,7 @@ def check_size(
         raise LogError(problem)
 
 
-def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
+def undecodable(pictures: LabelPictures, problem: str) -> LogError:
     """Return the error that no picture can be decoded, with the reason of the first one."""
     if not problem:
         first = read_or_error(pictures, 0) if len(pictures) else "it holds no picture"
@@ -507,12 +495,12 @@ def meaning_of(
     camera: Camera | None = None,
     pairing: Pairing | None = None,
 ) -> Meaning:
-    """Find the meaning of labels by looking at some; of those beside the log check the size, too.
+    """Find the meaning of labels by looking at some; check the size of labels beside the log, too.
 
-    A `LogError` if their values cannot be understood.
+    A `LogError` if their values have no clear meaning.
     """
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
-    seen: list[Mapping[int, int]] = []
+    counts: list[Mapping[int, int]] = []
     problem = ""
     for position, picture in samples(labels):
         file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
@@ -520,27 +508,28 @@ def meaning_of(
             if camera and pairing:
                 check_size(size_of(picture, labels.limits), labels, position, camera, pairing)
             if confidence is None:
-                seen.append(seen_in(picture, settings.labels, labels.name, labels.limits, file))
+                values = count_values(picture, settings.labels, labels.name, labels.limits, file)
             else:
-                seen.append({int(confidence.codes(picture, labels.limits).max()): 1})
+                values = {int(confidence.codes(picture, labels.limits).max()): 1}
+            counts.append(values)
         except BadMessage as error:
             problem = problem or str(error)
-    if not seen:
-        raise nothing_of(labels, problem)
+    if not counts:
+        raise undecodable(labels, problem)
     if confidence is not None:
         return confidence
     origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
     if origin.occurring:
-        meaning = of_classes(settings.labels, origin, labels.name)
+        meaning = understand_classes(settings.labels, origin, labels.name)
     else:
-        meaning = understand(settings.labels, seen, labels.name)
-    pixels = sum(map(Counter, seen), Counter[int]())
+        meaning = understand(settings.labels, counts, labels.name)
+    pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()
     for value, count in pixels.items():
         of_truth[meaning.meaning.get(value, meaning.others)] += count
-    road, known = of_truth[ROAD], pixels.total() - of_truth[IGNORE]
-    named = settings.labels.road or settings.labels.road_colors
-    if not named or road >= RARE * known:
+    road, labelled = of_truth[ROAD], pixels.total() - of_truth[IGNORE]
+    is_named = settings.labels.road or settings.labels.road_colors
+    if not is_named or road >= RARE * labelled:
         return meaning
     names = {value: name for name, value in origin.classes.items()}
     names |= {0: "no shape"} if names else {}
@@ -550,7 +539,7 @@ def meaning_of(
         for value, count in pixels.most_common(8)
     )
     doubt = (
-        f"road is {100 * road / known:.2f} % of the labelled pixels that were looked at, which "
+        f"road is {100 * road / labelled:.2f} % of the labelled pixels that were looked at, which "
         f"are {shares}: does `labels.road` name the road?"
     )
     return replace(meaning, notes=(doubt,))

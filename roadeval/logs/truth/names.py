@@ -1,6 +1,6 @@
-"""Labels that have names, beside the log: which frame each belongs to.
+"""Labels beside the log, and the frame of each by its name.
 
-A name has the frame's number, or its time, or is that of an image.
+A name contains the frame's number or its time, or is the name of an image.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import (
     IMAGES,
     NUMBER,
-    bare,
+    bare_name,
+    first_names,
     images_of,
-    listed,
-    matching,
-    ordered,
-    some,
+    list_files,
+    match_name,
+    order_by_time,
     time_in,
     without_hashes,
 )
@@ -36,19 +36,17 @@ from roadeval.logs.settings import LabelPlace
 from roadeval.runtime.text import visible
 
 SHORT: Final = 10
-"""Digits of what may be a time in seconds, or a frame's number with zeros before it."""
-_DIGITS: Final = 18
-"""Most digits of a number that 64 bits hold."""
+"""Digits of a name that may be a time in seconds, or a frame's number with zeros before it."""
 
 
 @dataclass(frozen=True)
 class NamedLabel:
-    """One label beside the log. All that a label format has to give is a list of them."""
+    """One label beside the log."""
 
     path: Path
-    """The file that it is named after, whether it is there or not; messages show it."""
+    """Its name, for messages; the file need not exist."""
     content: Callable[[], bytes]
-    """Read what the label is made of; an OSError if that fails."""
+    """Read the content of the label; an OSError if that fails."""
     picture: Callable[[bytes, Limits], Picture]
     """Return the picture of that content; a `BadMessage` or `ImageError` if there is none."""
 
@@ -59,11 +57,11 @@ class LabelSet:
 
     labels: Sequence[NamedLabel]
     classes: Mapping[str, int] = field(default_factory=dict)
-    """Values of the classes by their names, where the format has names."""
+    """Values of the classes by their names, if the format has names."""
     occurring: Mapping[str, int] = field(default_factory=dict)
-    """Number of labels in which each class occurs, if it is known without decoding them."""
+    """Number of labels in which each class occurs, if that is known without decoding them."""
     lost: int = 0
-    """How many of them cannot be read, so that their classes are not known."""
+    """Number of unreadable labels, with unknown classes."""
     notes: tuple[str, ...] = ()
     """Warnings about the labels, a sentence each."""
 
@@ -76,26 +74,26 @@ class NamedLabels:
     """The folder or file, for messages."""
     labels: tuple[NamedLabel, ...]
     origin: LabelSet
-    """Where they come from, with the names of their classes."""
+    """All labels of the folder or file, and their classes."""
     log_times: npt.NDArray[np.int64]
     """``(n,)``: the keys, rising."""
     by: str
-    """``number``, ``stamp`` or ``name``: where the keys come from."""
+    """The kind of the keys: ``number``, ``stamp`` or ``name``."""
     limits: Limits
-    """On the images."""
+    """Limits on the images."""
     first: int = 0
     """The number in the name of the first frame's label."""
     nameless: int = 0
-    """Further labels, whose name no image has."""
+    """Number of further labels that have the name of no image."""
     images: int | None = None
-    """How many images the folder holds whose names they have; None where names mean nothing."""
+    """Number of images in the folder that names are compared with; None without such a folder."""
 
     def __len__(self) -> int:
         return len(self.labels)
 
     @property
     def sure(self) -> int:
-        """How many of them certainly have their key: all."""
+        """The number of labels with a certain key, which is all of them."""
         return len(self.labels)
 
     def stamp(self, position: int) -> int:
@@ -117,7 +115,7 @@ class NamedLabels:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all keys and labels, in hexadecimal; a `LogError` if one cannot be read."""
+        """The SHA-256 of all keys and labels in hexadecimal; a `LogError` if one is unreadable."""
         digest = hashlib.sha256()
         for key, label in zip(self.log_times.tolist(), self.labels, strict=True):
             try:
@@ -128,27 +126,31 @@ class NamedLabels:
         return digest.hexdigest()
 
 
-def with_keys(
+def find_keys(
     origin: LabelSet, name: str, settings: LabelPlace, limits: Limits, frames: int | None = None
 ) -> NamedLabels:
-    """Find the key of each label by its name, as the settings ask.
+    """Find the key of each label by its name.
 
-    ``frames`` is the number of frames of the log, if no loss leaves it open. A `LogError` if a name
-    has no key, two labels have the same, or it is not plain which digits or which first number
-    count.
+    ``frames`` is the number of frames of the log, if it is certain. A `LogError` if a name has no
+    key, two labels have the same, or the digits or the first number are doubtful.
     """
     shown = {label.path: shown_name(label.path, name) for label in origin.labels}
-    names = {path: text for path, text in shown.items() if matching(settings.names, text)}
+    names = {path: text for path, text in shown.items() if match_name(settings.names, text)}
     if not names:
-        theirs = some([*shown.values()])
+        theirs = first_names([*shown.values()])
         raise LogError(f"{name}: no label has a name as `truth.names` {settings.names}: {theirs}")
-    images = None if settings.images is None else _images(Path(settings.images))
-    by, keys = _keys(names, settings, images)
+    images: list[Path] | None = None
+    if settings.images is not None:
+        folder = Path(settings.images)
+        images, _ = order_by_time(list_files(folder, IMAGES))  # the order of `pack`
+        if len({image.stem for image in images}) < len(images):
+            raise LogError(f"{folder}: two of its images have the same name")
+    by, keys = _keys_of(names, settings, images)
     if images is not None and not keys:
         raise LogError(
             f"{name}: none of them has the name of an image in {settings.images}: theirs are "
-            f"{some([*names])}, the images' {some(images)}; without `truth.images` numbers or "
-            "stamps pair them"
+            f"{first_names([*names])}, the images' {first_names(images)}; without `truth.images` "
+            "numbers or stamps pair them"
         )
     labels = [label for label in origin.labels if label.path in keys]
     labels.sort(key=lambda label: keys[label.path])
@@ -176,46 +178,38 @@ def with_keys(
 
 
 def shown_name(file: Path, folder: str) -> str:
-    """Return the name of a label's file as seen from the folder of all."""
+    """Return the path of a label's file below the folder of all labels."""
     inside = file.relative_to(folder) if file.is_relative_to(folder) else file
     return inside.as_posix()
 
 
-def _images(folder: Path) -> list[Path]:
-    """Return the images of a folder in the order in which `pack` logs them."""
-    images, _ = ordered(listed(folder, IMAGES))
-    if len({image.stem for image in images}) < len(images):
-        raise LogError(f"{folder}: two of its images have the same name")
-    return images
-
-
-def _keys(
+def _keys_of(
     files: Mapping[Path, str], settings: LabelPlace, images: Sequence[Path] | None
 ) -> tuple[str, dict[Path, int]]:
-    """Return what the keys are, and the key of each file that has one."""
+    """Return the kind of the keys, and the key of each file that has one."""
     if images is not None:
         places = {image: place for place, image in enumerate(images)}
         return "name", {file: places[image] for file, image in images_of([*files], images).items()}
-    times = {file: time for file in files if (time := time_in(bare(file))) is not None}
-    are_times = len(times) == len(files) and all(len(bare(file)) > SHORT for file in files)
+    times = {file: time for file in files if (time := time_in(bare_name(file))) is not None}
+    are_times = len(times) == len(files) and all(len(bare_name(file)) > SHORT for file in files)
     if settings.pair == "number" or (settings.pair is None and not are_times):
-        return "number", _numbers(files, settings.names)
+        return "number", _numbers_of(files, settings.names)
     for file in files:
         if file not in times:
             raise LogError(f"{file}: its name is not a time, so its frame cannot be found")
     return "stamp", times
 
 
-def _numbers(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
+def _numbers_of(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
     """Return the number in the name of each file: the group of digits by which the names differ.
 
-    A pattern with `NUMBER` says where it is. A `LogError` if the names differ otherwise, too.
+    A pattern with `NUMBER` shows its place. A `LogError` if the names differ elsewhere, too.
     """
     first, *_, last = *files, *files
     if NUMBER in pattern:
-        digits = (*(match[1] for name in files.values() if (match := matching(pattern, name))),)
+        digits = (*(match[1] for name in files.values() if (match := match_name(pattern, name))),)
     else:
-        parts = [re.split(r"(\d+)", name) for name in without_hashes([*map(bare, files)])]
+        parts = [re.split(r"(\d+)", name) for name in without_hashes([*map(bare_name, files)])]
         groups = [*zip(*(part[1::2] for part in parts), strict=False)]
         varied = [group for group in groups if len({text.lstrip("0") for text in group}) > 1]
         digits, *others = varied or groups[-1 if len(files) > 1 else 0 :] or [()]
@@ -223,20 +217,20 @@ def _numbers(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
         odd_one = next((file for file, part in texts if part[::2] != parts[0][::2]), None)
         if others or odd_one:
             raise LogError(
-                f"{some(sorted({first, odd_one or last}))}: the names do not tell which digits are "
-                f"the frame's number: show them by `truth.names`, as frame_{NUMBER}_*; or name the "
-                "folder of the log's images by `truth.images`"
+                f"{first_names(sorted({first, odd_one or last}))}: the names do not tell which "
+                f"digits are the frame's number: show them by `truth.names`, as frame_{NUMBER}_*; "
+                "or name the folder of the log's images by `truth.images`"
             )
-    if max(map(len, digits), default=_DIGITS + 1) > _DIGITS:
+    if not digits or max(map(len, digits)) > 18:  # more do not fit into 64 bits
         raise LogError(f"{first}: its name has no number: pair by names, with `truth.images`")
     return dict(zip(files, map(int, digits), strict=True))
 
 
 def _first_number(numbers: npt.NDArray[np.int64], frames: int | None, name: str) -> int:
-    """Return the number of the first frame, by the numbers of labels in rising order.
+    """Return the number of the first frame, given the numbers of labels in rising order.
 
-    A label of number 0 tells it, and labels up to as many as there are frames do, and a label for
-    every frame. A `LogError` if nothing does.
+    It is certain if a label has the number 0 or the number of frames, or if every frame has a
+    label; else a `LogError`.
     """
     low, high = int(numbers[0]), int(numbers[-1])
     if low == 0:

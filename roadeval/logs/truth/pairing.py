@@ -1,7 +1,7 @@
-"""Which label belongs to which image: by stamp, or by what takes its place.
+"""The pairing of labels with images: by stamp, or by log time, order, number or name.
 
-Labels may be logged long after their images, so log times do not pair them. Stamps are read only
-where they are needed: around the stamp that is looked for.
+Labels may be logged long after their images, so log times alone do not pair them. Stamps are read
+only where they are needed: around the stamp of the image.
 """
 
 from __future__ import annotations
@@ -20,28 +20,24 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import FrameError, LogError
-from roadeval.logs.files import some
+from roadeval.logs.files import first_names
 from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.logs.truth.names import NamedLabels
 
 REACH: Final = 4
-"""Messages to look at on either side: topics are logged nearly, not always, in stamp order. Where
-the first ones are in order, those within so many frame periods: others cost a chunk each."""
-ALONE_NS: Final = 50_000_000
-"""Half the period of a camera of 10 Hz."""
-CLOCKS_NS: Final = 3_000_000_000
-"""Least difference by which two clocks are told: of GPS, TAI and UTC any two lie farther apart."""
+"""Messages to look at on either side, because topics are logged nearly in the order of stamps. If
+the first stamps rise, only messages within so many frame periods: others cost a chunk each."""
 LOOKED_AT: Final = 10
-"""First images of a log that decide by what labels are paired."""
+"""Number of first images that decide how labels are paired."""
 
 LabelPictures = TopicReader | NamedLabels
 """Label pictures in the order of their times or numbers."""
 
 
 class Stamps(Protocol):
-    """The stamps of pictures, or numbers in place of stamps; nearly rising."""
+    """The stamps of pictures, or numbers that take their place; they nearly rise."""
 
     def __len__(self) -> int: ...
 
@@ -51,7 +47,7 @@ class Stamps(Protocol):
 
 
 class Times:
-    """Rising numbers in place of stamps; only the first ``sure`` of them, by default all, count."""
+    """Rising numbers that take the place of stamps; only the first ``sure`` of them are certain."""
 
     def __init__(
         self, times: Sequence[int] | npt.NDArray[np.int64], sure: int | None = None
@@ -69,7 +65,7 @@ class Times:
 
 @dataclass(frozen=True, eq=False)
 class Later:
-    """Stamps to each of which ``offset`` nanoseconds are added."""
+    """Stamps plus ``offset`` nanoseconds."""
 
     stamps: Stamps
     offset: int
@@ -78,17 +74,16 @@ class Later:
         return len(self.stamps)
 
     def stamp(self, position: int) -> int:
-        """Return the stamp at a position with the offset, or `UNREADABLE`."""
+        """Return the stamp at a position plus the offset, or `UNREADABLE`."""
         stamp = self.stamps.stamp(position)
         return stamp if stamp == UNREADABLE else stamp + self.offset
 
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
-    """Stamps of a topic near a moment; log times tell the others, which are not read.
+    """Stamps of a topic near a moment; the others are estimated by their log times, not read.
 
-    From stamp to log time it is as long as for the stamps that were read, or ``doubt`` more or
-    less.
+    The delay from stamp to log time is that of the stamps read so far, give or take ``doubt``.
     """
 
     topic: TopicReader
@@ -99,7 +94,7 @@ class Nearby:
         return len(self.topic)
 
     def stamp(self, position: int) -> int:
-        """Return the stamp at a position, or about it if that is far from the moment."""
+        """Return the stamp at a position, or an estimate if it is far from the moment."""
         if self.topic.delays is None or self.topic.knows(position):
             return self.topic.stamp(position)
         least, greatest = self.topic.delays
@@ -121,12 +116,12 @@ class Clock(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """The images that labels are paired with, and the rules for it."""
+    """The images that labels are paired with, and the rules for that."""
 
     images: TopicReader
     topic: TopicInfo
     clock: Clock
-    """Header stamps if they differ, else log times, else their order."""
+    """Header stamps if they differ, else log times if these differ, else their order."""
     tolerance_ns: int
     """Largest time between an image and its label."""
     resize_labels: bool
@@ -134,7 +129,7 @@ class Camera:
 
 
 def clock_of(reader: TopicReader) -> Clock:
-    """Return what differs among the first images of a topic."""
+    """Return the quantity that differs among the first images of a topic."""
     stamps = (reader.stamp(position) for position in range(len(reader)))
     first: list[int] = []
     for stamp in islice((stamp for stamp in stamps if stamp != UNREADABLE), LOOKED_AT):
@@ -148,14 +143,11 @@ def clock_of(reader: TopicReader) -> Clock:
 
 
 def tolerance(reader: TopicReader, setting_ms: float | None) -> int:
-    """Return the tolerance that is set, else half the frame period, in nanoseconds.
-
-    A single image has no period: its tolerance is `ALONE_NS`.
-    """
+    """Return the tolerance of the setting, else half the frame period, in nanoseconds."""
     if setting_ms is not None:
         return round(setting_ms * 1e6)
     if len(reader) == 1:
-        return ALONE_NS
+        return 50_000_000  # half the period of a camera of 10 Hz
     period = median_period(reader.log_times)
     if period == 0:
         stamps = sorted(reader.stamp(position) for position in range(min(LOOKED_AT, len(reader))))
@@ -165,29 +157,29 @@ def tolerance(reader: TopicReader, setting_ms: float | None) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """How the images and labels of one source are paired.
+    """The pairing of images with the labels of one source.
 
-    Equal stamps are a pair (the k-th image and the k-th label of the same stamp), in whatever order
-    they come; otherwise the nearest within the tolerance, if each is the other's nearest.
+    An image and a label of the same stamp are a pair (the k-th image and the k-th label, if several
+    have it); otherwise the nearest ones within the tolerance are, if each is the other's nearest.
     """
 
     images: Stamps
     labels: Stamps
     tolerance: int
-    """Largest difference of the stamps of a pair."""
+    """Largest difference between the stamps of a pair."""
     period: int = 0
-    """Nanoseconds from image to image by log times; 0 if that is of no use."""
+    """Nanoseconds from image to image by log times; 0 if that is useless."""
     is_small: bool = False
     """Whether all stamps may be read to find an equal one."""
     by: str = Clock.STAMP
     """The quantity that is compared: a `Clock`, or the ``number`` or ``name`` of the frame."""
     unused: int = 0
-    """Labels that belong to no frame of the log, as far as that is known beforehand."""
+    """Labels that belong to no frame of the log, if that is known beforehand."""
     note: str = ""
-    """Its unusual properties, for people."""
+    """Its unusual properties, in words."""
     unsure: int = 0
-    """Frames without a label because their number is not certain: an unknown number of images, or
-    of the other log's labels, is lost before them."""
+    """Frames without a label because their number is uncertain: an unknown number of images, or of
+    the other log's labels, is lost before them."""
 
     @cached_property
     def reach_ns(self) -> int | None:
@@ -198,16 +190,16 @@ class Pairing:
 
 
 def _rise(stamps: Stamps) -> bool:
-    """Whether the first stamps are in order."""
+    """Return whether the first stamps rise."""
     first = [stamps.stamp(position) for position in range(min(LOOKED_AT, len(stamps)))]
     return all(one < other for one, other in pairwise(first))
 
 
 class Partners:
-    """Finds each image's label, at most one; quickest for one image after the other.
+    """Finds the label of each image, fastest for one image after the other.
 
-    The search for the first one begins at the label position ``near``. If only a ``few`` of the
-    images are asked for, stamps that log times show to be far are not read.
+    The first search begins at the label position ``near``. If only a ``few`` of the images are
+    needed, distant stamps are estimated by log times instead of being read.
     """
 
     def __init__(self, pairing: Pairing, near: int = 0, *, few: bool = False) -> None:
@@ -216,14 +208,15 @@ class Partners:
         self.near = min(near, max(len(pairing.labels) - 1, 0))
         """Position of a label near the last image's stamp."""
         self.used: set[int] = set()
-        """Positions of the labels that were found."""
+        """Positions of the labels that have an image."""
         self.missed = 0
-        """Images that have no label because another one is nearer to it."""
+        """Images without a label because another image is nearer to it."""
 
     def of(self, image: int) -> int | None:
-        """Return the position of the label of an image; None if it has none."""
+        """Return the position of an image's label; None if it has none."""
         label = self._label(image)
-        self.used |= set() if label is None else {label}
+        if label is not None:
+            self.used.add(label)
         return label
 
     def _label(self, image: int) -> int | None:
@@ -232,23 +225,23 @@ class Partners:
             return None
         images, labels = self._around(stamp)
         reach = None if self._few else self._pairing.reach_ns
-        middle = _seek(labels, stamp, _expected(labels, stamp, self.near))
-        equal = _equal(labels, stamp, middle, reach)
+        middle = _seek(labels, stamp, _expected_position(labels, stamp, self.near))
+        equal = _find_equal(labels, stamp, middle, reach)
         if self._pairing.is_small and (not equal or equal[0] in self.used):
-            if image in self._anywhere:
-                return self._anywhere[image]
+            if image in self._all_equal:
+                return self._all_equal[image]
         elif not equal:
-            equal = _equal(labels, stamp, min(self.near + 1, len(labels) - 1), reach)
+            equal = _find_equal(labels, stamp, min(self.near + 1, len(labels) - 1), reach)
         if equal:
             self.near = equal[0]
-            rank = sum(1 for other in _equal(images, stamp, image, reach) if other < image)
+            rank = sum(1 for other in _find_equal(images, stamp, image, reach) if other < image)
             return equal[rank] if rank < len(equal) else None
-        label = self.near = _closest(labels, stamp, middle, reach)
-        theirs = labels.stamp(label)
-        if theirs == UNREADABLE or abs(theirs - stamp) > self._pairing.tolerance:
+        label = self.near = _find_nearest(labels, stamp, middle, reach)
+        label_stamp = labels.stamp(label)
+        if label_stamp == UNREADABLE or abs(label_stamp - stamp) > self._pairing.tolerance:
             return None
-        images, _ = self._around(theirs)
-        if _closest(images, theirs, _seek(images, theirs, image), reach) != image:
+        images, _ = self._around(label_stamp)
+        if _find_nearest(images, label_stamp, _seek(images, label_stamp, image), reach) != image:
             self.missed += 1
             return None
         return label
@@ -271,8 +264,8 @@ class Partners:
         return images, labels
 
     @cached_property
-    def _anywhere(self) -> dict[int, int | None]:
-        """The label of each image with whose stamp there is one, wherever both lie."""
+    def _all_equal(self) -> dict[int, int | None]:
+        """The label of each image that has the same stamp, at whatever distance."""
         images, labels = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
         for stamps, places in ((self._pairing.images, images), (self._pairing.labels, labels)):
             for place in range(len(stamps)):
@@ -281,9 +274,9 @@ class Partners:
         return {image: label for both in pairs for image, label in both if image is not None}
 
     def unpaired(self, *, of_all: bool) -> tuple[int, int]:
-        """Count the labels that no image found: of all, or of those between labels that one did.
+        """Count the labels without an image: all, or only those between labels with an image.
 
-        Also return the nanoseconds between the first of them and the nearest image.
+        Also return the nanoseconds between the first one and the nearest image.
         """
         images, labels = self._pairing.images, self._pairing.labels
         first, last = min(self.used, default=0), max(self.used, default=0)
@@ -293,7 +286,7 @@ class Partners:
         if not stamps:
             return 0, 0
         middle = _seek(images, stamps[0], 0)
-        nearest = _closest(images, stamps[0], middle, self._pairing.reach_ns)
+        nearest = _find_nearest(images, stamps[0], middle, self._pairing.reach_ns)
         return len(stamps), abs(images.stamp(nearest) - stamps[0])
 
 
@@ -309,25 +302,25 @@ def frames_of(
     forth = Partners(pairing, few=few)
     for label in range(len(labels))[begin:end]:
         image = back.of(label)
-        # Where many stamps are equal or out of order, two labels may find the same image.
+        # If many stamps are equal or out of order, two labels may find the same image.
         if image is not None and forth.of(image) == label:
             yield image
 
 
-def _closest(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> int:
-    """Return the position of the nearest stamp around a position (the first of equals)."""
+def _find_nearest(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> int:
+    """Return the position of the nearest stamp around a position (the first if several are)."""
 
     def distance(position: int) -> int:
-        theirs = stamps.stamp(position)
-        return 2**64 if theirs == UNREADABLE else abs(theirs - stamp)
+        other = stamps.stamp(position)
+        return 2**64 if other == UNREADABLE else abs(other - stamp)
 
     return min(_window(stamps, stamp, middle, reach), key=distance)
 
 
-def _equal(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> list[int]:
-    """Return the positions with a stamp around a position, in order.
+def _find_equal(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> list[int]:
+    """Return the positions of a stamp around a position, in order.
 
-    Where the stamp comes more often in a row than is looked at, the row is followed to its ends.
+    If equal stamps fill the window at an end, they are followed beyond it.
     """
     window = _window(stamps, stamp, middle, None if reach is None else 0)
     equal = [place for place in window if stamps.stamp(place) == stamp]
@@ -340,7 +333,7 @@ def _equal(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> list[i
 
 
 def _window(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> range:
-    """Return the positions around one, to the first stamp on a side beyond the reach."""
+    """Return the positions around one, on each side up to the first stamp beyond the reach."""
     first, last = max(middle - REACH, 0), min(middle + REACH, len(stamps) - 1)
     if reach is not None:
         left, right = range(middle - 1, first, -1), range(middle, last)
@@ -350,8 +343,8 @@ def _window(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> range
     return range(first, last + 1)
 
 
-def _expected(stamps: Stamps, stamp: int, near: int) -> int:
-    """Return where a stamp lies if log times are as far from stamps as at the position ``near``."""
+def _expected_position(stamps: Stamps, stamp: int, near: int) -> int:
+    """Return the position of a stamp if its delay to the log time is that of ``near``."""
     if not isinstance(stamps, TopicReader) or (there := stamps.stamp(near)) == UNREADABLE:
         return near
     logged = int(stamps.log_times[near]) - there + stamp
@@ -360,9 +353,9 @@ def _expected(stamps: Stamps, stamp: int, near: int) -> int:
 
 
 def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
-    """Return the first position at or after a stamp: ever longer steps from the hint, then halving.
+    """Return the first position at or after a stamp, by a galloping search from a hint.
 
-    A stamp that cannot be read counts as the next one that can.
+    An unreadable stamp counts as the next readable one.
     """
 
     def at(position: int) -> int:
@@ -379,17 +372,16 @@ def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
 
 
 def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pairing:
-    """Pair by stamps, by log times, or by order where the log has no times at all.
+    """Pair by stamps, by log times, or by order if the log has no times at all.
 
-    The offset is added to the labels' times. Order means something only if there is a label for
-    each image.
+    The offset is added to the labels' times. Order pairs only if there is a label for each image.
     """
     images, clock, offset = camera.images, camera.clock, round(offset_ms * 1e6)
     note = ""
     if clock is Clock.STAMP and isinstance(labels, TopicReader):
         check_clocks(images, labels, offset)
     elif clock is Clock.STAMP and isinstance(labels, NamedLabels) and len(labels):
-        clock, note = _clock_of_names(images, labels, camera.tolerance_ns, offset)
+        clock, note = _find_clock(images, labels, camera.tolerance_ns, offset)
     if clock is Clock.STAMP:
         is_small = images.is_small and (isinstance(labels, NamedLabels) or labels.is_small)
         stamps = Later(labels, offset) if offset else labels
@@ -405,9 +397,9 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
 
 
 def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
-    """Refuse, as a `LogError`, labels that another clock has stamped than the images.
+    """Raise a `LogError` if labels have stamps of another clock than the images.
 
-    From stamp to log time it is then another time than for the images, and the same at both ends.
+    Their delay from stamp to log time then differs from the images' by the same time at both ends.
     Labels that were only logged late have stamps among the images', or log times behind theirs.
     """
     if not len(labels):
@@ -417,47 +409,42 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
     begin, end = (theirs[place] + offset - ours[place] for place in (0, 1))
     logged, last = (int(labels.log_times[at]) - int(images.log_times[at]) for at in (0, -1))
     apart = begin - logged
-    if (
-        min(*ours, *theirs) <= 0
-        or abs(apart) < CLOCKS_NS
-        or 4 * abs(end - last - apart) > abs(apart)
-    ):
+    # Any two of GPS, TAI and UTC differ by more than three seconds.
+    if min(*ours, *theirs) <= 0 or abs(apart) < 3 * NS or 4 * abs(end - last - apart) > abs(apart):
         return
     outside = 2 * (-begin if apart < 0 else end) > abs(apart)
     one_log = labels.channels[0].container in [channel.container for channel in images.channels]
     if outside or (one_log and 2 * max(-logged, last) <= abs(apart)):
-        # Labels come some moments after their images.
-        whole = round(apart / NS, 0 if abs(apart / NS - round(apart / NS)) < 0.2 else 3)
-        side = "before" if whole < 0 else "after"
+        # Labels come some moments after their images, so nearly a full second is one.
+        seconds = round(apart / NS, 0 if abs(apart / NS - round(apart / NS)) < 0.2 else 3)
+        side = "before" if seconds < 0 else "after"
         raise LogError(
             f"{labels.name}: its stamps are of another clock than those of {images.name}: they lie "
-            f"about {abs(whole):g} s {side} them for the same log times; `topics.sync_offset_ms` "
-            f"{round(-whole * 1000)} moves the truth's to the images'"
+            f"about {abs(seconds):g} s {side} them for the same log times; `topics.sync_offset_ms` "
+            f"{round(-seconds * 1000)} moves the truth's to the images'"
         )
 
 
-def _clock_of_names(
-    images: TopicReader, labels: NamedLabels, most: int, offset: int
+def _find_clock(
+    images: TopicReader, labels: NamedLabels, tolerance_ns: int, offset: int
 ) -> tuple[Clock, str]:
-    """Return what the times in the labels' names are, and what is said of it.
+    """Return whether the times in the labels' names are stamps or log times, and a note on that.
 
-    Where none is the stamp of an image, they are log times if those are other frames' than the
-    stamps nearby, and the labels follow them, or are nearer to them.
+    They are log times if none is the stamp of an image, and they follow or are nearer to log times,
+    which belong to other frames than the nearest stamps.
     """
     keys, logged = labels.log_times + offset, images.log_times
     keys = keys[np.unique(np.linspace(0, len(keys) - 1, 2 * LOOKED_AT, dtype=int))]
     frames = []
     for key in keys.tolist():
         hint = min(int(np.searchsorted(logged, key)), len(images) - 1)
-        middle = _seek(images, key, hint)
-        frames.append(
-            [_closest(images, key, middle, None), _closest(Times(logged), key, hint, None)]
-        )
+        near_stamp = _find_nearest(images, key, _seek(images, key, hint), None)
+        frames.append([near_stamp, _find_nearest(Times(logged), key, hint, None)])
     by_stamp, by_log = np.array(frames).T
     behind = keys - [images.stamp(frame) for frame in by_stamp.tolist()]
     after = keys - logged[by_log]
     step = next(10**n for n in range(9, 2, -1) if n == 3 or not (keys % 10**n).any())
-    if np.median(np.abs(behind)) < step or np.abs([behind, after]).min() > most:
+    if np.median(np.abs(behind)) < step or np.abs([behind, after]).min() > tolerance_ns:
         return Clock.STAMP, ""
     stamped, away = (float(np.median(times)) / 1e6 for times in (behind, after))
     is_nearer = (stamped < 0, abs(stamped)) <= (away < 0, abs(away))
@@ -466,7 +453,7 @@ def _clock_of_names(
             f"no name is the stamp of a frame: by median they lie {stamped:.1f} ms after the "
             "nearest one; if they are of another one, `topics.sync_offset_ms` moves them"
         )
-    met = int(np.count_nonzero(np.abs(after) <= most))
+    met = int(np.count_nonzero(np.abs(after) <= tolerance_ns))
     return Clock.LOG_TIME, (
         f"no name is the stamp of a frame: log times pair them, for {met} of the {len(keys)} that "
         f"were looked at lie {away:.1f} ms after a frame's log time, by median"
@@ -474,7 +461,7 @@ def _clock_of_names(
 
 
 def check_times(pairing: Pairing, name: str) -> None:
-    """Refuse, as a `LogError`, labels beside the log of which none has the time of a frame."""
+    """Raise a `LogError` if no label beside the log has the time of a frame."""
     if not len(pairing.labels):
         raise LogError(f"{name}: the log has no times to pair by; set `truth.pair` to number")
     if next(frames_of(pairing), None) is None:
@@ -493,39 +480,40 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     """Pair by frame numbers.
 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
-    certain number, and no label. A `LogError` if no number is a frame's.
+    certain number, and no label. A `LogError` if no label has the number of a frame.
     """
-    frames, shown = len(images), _as_shown(images)
+    frames, shown = len(images), _numbers_as_shown(images)
     if isinstance(labels, TopicReader):
         first = settings.first or 0
-        known = labels.sure - first if labels.sure < len(labels) else frames
-        unsure = frames - max(0, min(images.sure, known))
+        certain = labels.sure - first if labels.sure < len(labels) else frames
+        unsure = frames - max(0, min(images.sure, certain))
         numbers = Times(range(-first, labels.sure - first))
         return Pairing(Times(shown, images.sure), numbers, 0, by="number", unsure=unsure)
     name, keys, first = labels.name, labels.log_times, labels.first
-    named, cut = labels.images, images.expected() != frames
-    if named is not None and (named < frames or (named > frames and not cut)):
+    in_folder, is_cut = labels.images, images.expected() != frames
+    if in_folder is not None and (in_folder < frames or (in_folder > frames and not is_cut)):
         raise LogError(
-            f"{name}: {settings.images} holds {named} images and the log {frames}, so it was not "
-            "made of all of them: leave `truth.images` out, and pair by number or stamp"
+            f"{name}: {settings.images} holds {in_folder} images and the log {frames}, so it was "
+            "not made of all of them: leave `truth.images` out, and pair by number or stamp"
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
+        names = first_names([label.path for label in labels.labels])
         raise LogError(
             f"{name}: none of them belongs to a frame by {labels.by}: theirs are "
-            f"{keys[0] + first} to {keys[-1] + first} ({some([e.path for e in labels.labels])}), "
+            f"{keys[0] + first} to {keys[-1] + first} ({names}), "
             f"the frames' {first} to {first + frames - 1}: if {keys[0] + first} is the first "
             "frame's, set `truth.first` to it; or name the folder of the images that the log was "
             "made of with `truth.images`"
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
     unsure = frames - images.sure
-    frames_by = Times(shown, images.sure)
-    return Pairing(frames_by, labels, 0, by=labels.by, unused=unused, unsure=unsure)
+    numbers = Times(shown, images.sure)
+    return Pairing(numbers, labels, 0, by=labels.by, unused=unused, unsure=unsure)
 
 
-def _as_shown(images: TopicReader) -> Sequence[int]:
-    """Return the number of each image: of a video with B-frames, that in the order of stamps."""
+def _numbers_as_shown(images: TopicReader) -> Sequence[int]:
+    """Return the number of each image; a video with B-frames is numbered in the order of stamps."""
     with suppress(FrameError):
         if not _rise(images) and codec_of(images.picture(0)):
             stamps = [images.stamp(position) for position in range(len(images))]

@@ -1,4 +1,4 @@
-"""Frames that were picked to be labelled: which, why, and how probable each was; ``pick.json``."""
+"""Frames that were picked to be labelled, why, and with what probability: ``pick.json``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from roadeval.data import ROAD, Truth
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import some
+from roadeval.logs.files import first_names
 from roadeval.logs.truth.names import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
@@ -25,7 +25,7 @@ PICK: Final = "pick.json"
 IMAGES: Final = "images"
 PROPOSALS: Final = "proposals"
 LABELS: Final = "labels"
-"""What the folder of picked frames holds: this file, and these folders."""
+"""The file and the folders in a folder of picked frames."""
 FORMAT: Final = {"name": "roadeval-pick", "version": 1}
 
 
@@ -33,9 +33,9 @@ class Why(StrEnum):
     """Why a frame was picked."""
 
     RANDOM = "random"
-    """Drawn by chance: the number for the whole drive comes from these."""
+    """Drawn by chance: the error rate of the drive is estimated from these."""
     RANKED = "ranked"
-    """Most in doubt: to look at, and to learn from."""
+    """Most in doubt: they are for looking at, and for training."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ class Picked:
     stamp_ns: int
     why: Why
     probability: float | None
-    """Probability of being among those that were drawn; None of a ranked one."""
+    """Probability of being drawn; None for a ranked frame."""
     score: float | None
     proposal: str
-    """Digest of the mask that was proposed, see `digest_of`."""
+    """Digest of the proposed mask, see `digest_of`."""
     wave: int = 1
     """The number of the command that picked it, from 1."""
 
@@ -63,14 +63,14 @@ class Picks:
     log: str | None
     """The log's digest, if it is known."""
     method: Mapping[str, Any]
-    """The ``variant`` that made the masks, the sign it is ``ranked_by``, the run's ``identity``."""
+    """The ``variant`` that made the masks, its ``ranked_by`` score, the run's ``identity``."""
     seed: int
     drawn: int
     """Frames that were drawn by chance so far, in `roadeval.evaluation.stats.draw_order`."""
     frames: list[int]
     stamps: list[int]
     scores: list[float | None]
-    """Every frame that could be picked: its number, its stamp and how much it was in doubt."""
+    """Every frame that could be picked: its number, its stamp and its degree of doubt."""
     picked: list[Picked]
     format: dict[str, Any] = field(default_factory=lambda: dict(FORMAT))
 
@@ -80,7 +80,7 @@ class Picks:
 
     @classmethod
     def read(cls, folder: Path) -> Picks | None:
-        """Read the picks of a folder; None where it holds none. A `LogError` if damaged."""
+        """Read the picks of a folder; None if it has none. A `LogError` if they are damaged."""
         path = folder / PICK
         if not path.is_file():
             return None
@@ -98,12 +98,12 @@ class Picks:
 
     @classmethod
     def of_labels(cls, labels: Path) -> Picks | None:
-        """Read the picks whose folder labels lie in, or are; None where there are none."""
+        """Read the picks of the folder with these labels; None if there are none."""
         folders = [labels, *labels.resolve().parents[:2]]
         return next((picks for folder in folders if (picks := cls.read(folder))), None)
 
     def _contradiction(self) -> str:
-        """Return which of the numbers contradict each other; empty if none."""
+        """Return how the numbers contradict each other; empty if they do not."""
         random = sum(frame.why is Why.RANDOM for frame in self.picked)
         frame_of = dict(zip(self.stamps, self.frames, strict=False))
         sizes = {len(self.frames), len(self.stamps), len(self.scores), len(frame_of)}
@@ -117,11 +117,11 @@ class Picks:
             return f"{random} frames are random, but {self.drawn} were drawn"
         return ""
 
-    # Stamps are compared as floats, for programs that rewrite JSON round them to such.
+    # Stamps are compared as floats, because programs that rewrite JSON round them to floats.
 
     @cached_property
     def places(self) -> dict[float, int]:
-        """The places of all frames that could be picked, by their stamps."""
+        """The positions of all frames that could be picked, by their stamps."""
         return {float(stamp): place for place, stamp in enumerate(self.stamps)}
 
     @cached_property
@@ -135,22 +135,23 @@ class Picks:
         return picked is not None and picked.why is why
 
     def every_score(self) -> npt.NDArray[np.float64]:
-        """Return how much each frame was in doubt, ``(n,)``; NaN where that is not known."""
+        """Return the degree of doubt of each frame, ``(n,)``; NaN if it is unknown."""
         return np.array(self.scores, np.float64)
 
     def check(self, labels: NamedLabels) -> None:
-        """Refuse, as a `LogError`, labels with numbers that are not those of the picked frames."""
+        """Raise a `LogError` if labels have numbers of frames that were not picked."""
         picked = {frame.frame for frame in self.picked}
         keys = labels.log_times.tolist()
         others = [labels.labels[at].path for at, key in enumerate(keys) if key not in picked]
         if labels.by == "number" and others:
             raise LogError(
                 f"{labels.name}: {len(others)} of {len(keys)} labels have numbers of frames that "
-                f"were not picked ({some(others)}): give them the names of their images in {IMAGES}"
+                f"were not picked ({first_names(others)}): give them the names of their images in "
+                f"{IMAGES}"
             )
 
     def is_proposal(self, stamp_ns: int, truth: Truth) -> bool:
-        """Return whether a label is still as it was proposed, so that nobody has corrected it."""
+        """Return whether a label is the unchanged proposal, which nobody has corrected."""
         picked = self.by_stamp.get(float(stamp_ns))
         return picked is not None and picked.proposal == digest_of(truth == ROAD)
 

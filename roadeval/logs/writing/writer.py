@@ -1,7 +1,7 @@
-"""The writer of camera logs, which Foxglove and Rerun open too; of images, a video, or results.
+"""The writers of camera logs from images, a video, or results; Foxglove and Rerun open them too.
 
-Viewers merge files that are open together by their times, so the messages of a sidecar of results
-bear the images' own stamps and log times; the camera's log is not changed.
+Viewers merge open files by time, so the messages of a sidecar of results have the stamps and log
+times of the images. The camera's log is not changed.
 """
 
 from __future__ import annotations
@@ -25,15 +25,21 @@ from roadeval.data.arrays import Image
 from roadeval.images.decoding import orientation_of, png_of, size_of, upright
 from roadeval.images.formats import ImageError, Limits, format_of
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import IMAGES, images_of, listed, of_ids, ordered, some
+from roadeval.logs.files import (
+    IMAGES,
+    first_names,
+    images_of,
+    list_files,
+    order_by_time,
+    prefer_ids,
+)
 from roadeval.logs.messages.pictures import turn_of
 from roadeval.logs.settings import NS
 from roadeval.runtime.files import NewFile, check_input, writing
 from roadeval.version import VERSION
 
-FORMATS: Final = ("jpeg", "png", "webp")
 FRAME_ID: Final = "camera"
-"""The camera's coordinate frame, by name."""
+"""The default name of the camera's coordinate frame."""
 
 
 Schema = tuple[str, str, bytes]
@@ -43,9 +49,9 @@ Schema = tuple[str, str, bytes]
 class LogWriter:
     """Writes images to an MCAP file with Foxglove's protobuf schemas.
 
-    The same calls give the same bytes. The file appears under its name when it is complete: at the
-    end of the ``with`` statement, and never if that ends by an exception. An existing file is
-    replaced, and the folder is made if it does not exist. A `LogError` if it cannot be written.
+    The same calls give the same bytes. The file appears under its name at the end of the ``with``
+    statement, unless that ends by an exception. An existing file is replaced, and the folder is
+    made if necessary. A `LogError` if it cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -70,15 +76,15 @@ class LogWriter:
         log_time_ns: int | None = None,
         frame_id: str = FRAME_ID,
     ) -> None:
-        """Write an image file as it is.
+        """Write an image file unchanged.
 
         ``format`` is ``jpeg``, ``png`` or ``webp``; the log time is the stamp by default. A
         `LogError` if the disk is full, or the format is another.
         """
         from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
-        if format not in FORMATS:
-            raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
+        if format not in (formats := ("jpeg", "png", "webp")):
+            raise LogError(f"{topic}: format {format!r} is none of {', '.join(formats)}")
         message = CompressedImage(frame_id=frame_id, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
         data = message.SerializeToString(deterministic=True)
@@ -93,10 +99,7 @@ class LogWriter:
         log_time_ns: int | None = None,
         frame_id: str = FRAME_ID,
     ) -> None:
-        """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
-
-        A `LogError` if the disk is full.
-        """
+        """Write a ``(H, W)`` mask, or an RGB or RGBA image, as a PNG; errors as in `image`."""
         png = png_of(mask)
         self.image(topic, stamp_ns, png, "png", log_time_ns=log_time_ns, frame_id=frame_id)
 
@@ -115,10 +118,7 @@ class LogWriter:
             self._writer.add_message(channel, log_time, data, stamp_ns, next(sequence))
 
     def finish(self) -> None:
-        """Write the end of the file; it gets its name when the ``with`` statement ends.
-
-        A `LogError` if the disk is full.
-        """
+        """Write the end of the file; a `LogError` if the disk is full."""
         if not self._file.closed:
             with writing(self.path, LogError):
                 self._writer.finish()  # type: ignore[no-untyped-call]
@@ -134,7 +134,7 @@ class LogWriter:
                 with writing(self.path, LogError):
                     self._new.publish()
         finally:
-            # On a full disk closing fails as well, but the first error is the one to report.
+            # On a full disk closing fails as well; the first error is reported.
             with suppress(OSError):
                 self._file.close()
             self._new.discard()
@@ -158,15 +158,15 @@ _RATE: Final = {"type": ["number", "null"], "description": "a fraction; null if 
 class SidecarWriter(LogWriter):
     """Writes masks, error maps and metrics of each frame.
 
-    ``/roadeval/<variant>/<stage>`` holds a mask (PNG, road 255), ``/roadeval/<variant>/errors``
-    the error map in its colours (PNG), ``/roadeval/metrics/<variant>/<stage>`` counts and rates
-    (JSON with a schema). Of a rig the camera's name follows after ``/roadeval``.
+    ``/roadeval/<variant>/<stage>`` has masks (PNG, road 255), ``/roadeval/<variant>/errors`` error
+    maps in colours (PNG), and ``/roadeval/metrics/<variant>/<stage>`` counts and rates (JSON with a
+    schema). In a rig the camera's name follows after ``/roadeval``.
     """
 
     def write(self, result: FrameResult, frame_id: str, camera: str = "") -> None:
-        """Write a frame's results; frames come in the order of their log times.
+        """Write the results of a frame; frames come in the order of their log times.
 
-        ``frame_id`` is the source's, ``camera`` its name in a rig. A `LogError` if the disk is
+        ``frame_id`` is that of the image, ``camera`` its name in a rig. A `LogError` if the disk is
         full.
         """
         root = "/".join(filter(None, (ROOT, camera.strip("/"))))
@@ -201,11 +201,11 @@ class SidecarWriter(LogWriter):
             }
             data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
             topic = f"{root}/metrics/{tally.variant}/{tally.stage}"
-            self._write(topic, _schema(tuple(tally.rates)), stamp, log_time, data)
+            self._write(topic, _metrics_schema(tuple(tally.rates)), stamp, log_time, data)
 
 
 class NoSidecar:
-    """Writes nothing, for a run without a sidecar."""
+    """Writes nothing, in a run without a sidecar."""
 
     path: Final = None
 
@@ -219,12 +219,12 @@ class NoSidecar:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Nothing is open."""
+        """Close nothing."""
 
 
 @cache
-def _schema(rates: tuple[str, ...]) -> Schema:
-    """Return the JSON Schema of the metrics, with Foxglove's own form of a time."""
+def _metrics_schema(rates: tuple[str, ...]) -> Schema:
+    """Return the JSON Schema of the metrics, with Foxglove's form of a time."""
     time = {"type": "object", "title": "time", "properties": {"sec": _INTEGER, "nsec": _INTEGER}}
     counts = dict.fromkeys(("frame", "TP", "TN", "FP", "FN", "N"), _INTEGER)
     properties = {"timestamp": time, "variant": {"type": "string"}, "stage": {"type": "string"}}
@@ -235,23 +235,17 @@ def _schema(rates: tuple[str, ...]) -> Schema:
 
 CAMERA: Final = "/camera/image"
 TRUTH: Final = "/truth/road"
-DEFAULT_RATE_HZ: Final = 10.0
-LABEL_DELAY_NS: Final = 1
-"""A label is logged right after its image."""
-
 VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
-QUALITY: Final = 95
-"""JPEG quality of a video's frames, 0 to 100."""
 
 
 @dataclass(frozen=True)
 class PackResult:
-    """The log that was written, and what a user should know of it."""
+    """The log that was written, and facts about it for the user."""
 
     path: Path
     frames: int
     labelled: int
-    """Images, and how many of them have a mask."""
+    """Images, and images with a mask."""
     stamps: str
     """Source of the stamps, in words."""
     warnings: tuple[str, ...] = ()
@@ -265,15 +259,16 @@ def pack(
     masks: str | Path | None = None,
     rate_hz: float | None = None,
 ) -> PackResult:
-    """Write a folder of images, in natural order, or a video as a log: see `roadeval.pack`.
+    """Write a folder of images in natural order, or a video, as a log: see `roadeval.pack`.
 
-    JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. ``masks`` is a folder
-    of label images without loss; each belongs to the image of the same name, endings such as
-    ``_mask`` aside. The same files give the same bytes. A `LogError` if there is nothing to pack, a
-    file is unreadable, or no mask belongs to an image.
+    JPEGs and PNGs are copied unchanged, frames of a video become JPEGs of quality 95. ``masks`` is
+    a folder of lossless label images; each belongs to the image of the same name, without endings
+    such as ``_mask``. The same files give the same bytes.
 
-    ``rate_hz`` is images a second: by default a video's own; of images, the times in their names if
-    every name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
+    ``rate_hz`` is images a second. By default a video has its own times; images have the times in
+    their names if every name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else
+    10 images a second. A `LogError` if there is nothing to pack, a file is unreadable, or no mask
+    belongs to an image.
     """
     images, output = Path(images), Path(output)
     if rate_hz is not None and not 1e-4 <= rate_hz <= 1000:
@@ -284,34 +279,36 @@ def pack(
         raise LogError(f"{images}: neither a folder of images nor a video")
     if masks is not None:
         raise LogError(f"{images}: masks go with a folder of images, not with a video")
-    number, turned = 0, set[int]()
+    number, orientations = 0, set[int]()
     with LogWriter(output) as log:
-        for number, (time_ns, jpeg) in enumerate(_frames_of(images, turned), start=1):
+        for number, (time_ns, jpeg) in enumerate(_read_frames(images, orientations), start=1):
             regular = 0 if rate_hz is None else round((number - 1) * NS / rate_hz)
             log.image(CAMERA, time_ns if rate_hz is None else regular, jpeg, "jpeg")
         if not number:
             raise LogError(f"{images}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
     matrix = "frames are turned as the video's display matrix asks; calibrations are of the sensor"
-    return PackResult(output, number, 0, words, (matrix,) if turned - {1} else ())
+    return PackResult(output, number, 0, words, (matrix,) if orientations - {1} else ())
 
 
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
-    files, labels = listed(images, IMAGES), _label_images(masks, images) if masks else []
+    files, labels = list_files(images, IMAGES), _list_labels(masks, images) if masks else []
     belong = images_of(labels, files)
     if labels and not belong:
-        raise LogError(f"{masks}: no mask has the name of an image in {images} ({some(labels)})")
+        raise LogError(
+            f"{masks}: no mask has the name of an image in {images} ({first_names(labels)})"
+        )
     by_image: dict[Path, Path] = {}
     for label, image in belong.items():
         if (other := by_image.setdefault(image, label)) != label:
             raise LogError(f"{masks}: {other.name} and {label.name} belong to the same image")
-    in_order, times = ordered(files)
+    in_order, times = order_by_time(files)
     if rate_hz is None and times is not None:
         files, words = in_order, "the times in the files' names"
     else:
-        rate = rate_hz or DEFAULT_RATE_HZ
+        rate = rate_hz or 10.0
         words = f"{rate:g} images a second"
         times = [round(i * NS / rate) for i in range(len(files))]
     turned: list[Path] = []
@@ -322,21 +319,24 @@ def _pack_folder(
             log.image(CAMERA, stamp, data, name)
             if file in by_image:
                 label_file = _image(by_image[file], is_label=True)
-                log.image(TRUTH, stamp, *label_file, log_time_ns=stamp + LABEL_DELAY_NS)
+                log.image(TRUTH, stamp, *label_file, log_time_ns=stamp + 1)  # after its image
     unpaired = {
         "images without a mask": [file for file in files if labels and file not in by_image],
         "masks without an image": [label for label in labels if label not in belong],
         "images that their EXIF orientation turns, in replay as in viewers": turned,
     }
-    told = (f"{what}: {some(odd)} ({len(odd)} in all)" for what, odd in unpaired.items() if odd)
-    return PackResult(output, len(files), len(by_image), words, tuple(told))
+    warnings = tuple(
+        f"{what}: {first_names(odd)} ({len(odd)} in all)" for what, odd in unpaired.items() if odd
+    )
+    return PackResult(output, len(files), len(by_image), words, warnings)
 
 
-def _label_images(masks: Path, images: Path) -> Sequence[Path]:
+def _list_labels(masks: Path, images: Path) -> Sequence[Path]:
+    """List the label images for a folder of images; a `LogError` if there are none."""
     try:
         if masks.resolve() == images.resolve():
             raise LogError(f"{masks}: the images themselves")
-        return of_ids(listed(masks, IMAGES))
+        return prefer_ids(list_files(masks, IMAGES))
     except LogError as error:
         if not masks.exists():
             raise
@@ -346,12 +346,11 @@ def _label_images(masks: Path, images: Path) -> Sequence[Path]:
         ) from error
 
 
-def _frames_of(video: Path, turned: set[int]) -> Iterator[tuple[int, bytes]]:
+def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, bytes]]:
     """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
 
-    ``turned`` receives the orientations by which frames are turned.
-
-    A `LogError` if it cannot be read, or holds no video.
+    Adds to the ``orientations`` from which frames are turned. A `LogError` if it cannot be read, or
+    holds no video.
     """
     import av
     import cv2
@@ -366,16 +365,16 @@ def _frames_of(video: Path, turned: set[int]) -> Iterator[tuple[int, bytes]]:
                 pts = index if frame.pts is None else frame.pts
                 first = pts if first is None else first
                 unit = stream.time_base or Fraction(1, 25)
-                turned.add(turn := turn_of(frame))
-                bgr = upright(frame.to_ndarray(format="bgr24"), turn)
-                _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+                orientations.add(orientation := turn_of(frame))
+                bgr = upright(frame.to_ndarray(format="bgr24"), orientation)
+                _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, 95])
                 yield round((pts - first) * unit * NS), jpeg.tobytes()
     except (av.FFmpegError, OSError) as error:
         raise LogError(f"{video}: not a readable video ({error.strerror})") from error
 
 
 def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
-    """Read a JPEG or PNG file as it is, whatever its ending; a label must not be a JPEG."""
+    """Read a JPEG or PNG file with any ending; a label must not be a JPEG."""
     try:
         check_input(file)
         data = file.read_bytes()

@@ -1,7 +1,7 @@
 """Exposure and white balance: the ground in front of the vehicle gets the same grey in each frame.
 
-What is brighter than the patch is compressed and not clipped, so that it keeps its differences
-where the patch lies in the shade or on a dark vehicle.
+Pixels brighter than the patch are compressed and not clipped, so that they keep their differences
+if the patch lies in the shade or on a dark vehicle.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Final
 
 from roadeval.data import Layer, LayerKind, LayerSpec
 from roadeval.pipeline.reference_patch import ReferencePatch
-from roadeval.pipeline.scene import exposed
+from roadeval.pipeline.scene import expose_by_patch
 from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
@@ -23,8 +23,8 @@ class ExposureSettings:
 
 @per_view
 def bind(_settings: ExposureSettings, _learnt: None, view: View) -> Output:
-    """Expose what is seen."""
-    image = exposed(view.image, ReferencePatch())
+    """Expose the image of a view."""
+    image = expose_by_patch(view.image, ReferencePatch())
     return Output((Layer(EXPOSED, image),), image=image)
 
 

@@ -1,7 +1,7 @@
-"""Features of a pixel of the ground, in groups: each is one idea of what tells road from the rest.
+"""Features of a pixel of the ground, in groups; each group is one idea of how road differs.
 
 A group is a function of the `Scene`, in `GROUPS`. It returns its features by name, each ``(h, w)``
-float32 or what NumPy spreads to that.
+float32 or an array that NumPy broadcasts to that.
 """
 
 from __future__ import annotations
@@ -27,28 +27,27 @@ TONES: Final = ("light", "red_green", "blue_green")
 """Names of the tones."""
 
 ANGLES: Final = (30, 45, 60)
-"""Of the projections, in degrees from ``ln R - ln G`` towards ``ln B - ln G``."""
+"""Directions of the projections, in degrees from ``ln R - ln G`` towards ``ln B - ln G``."""
 SMOOTH: Final = 7
 """Side of the square over which the distance to the patch is averaged."""
 PERCENTILES: Final = (50, 80)
-"""Of the log brightness in the lower half."""
+"""Percentiles of the log brightness in the lower half."""
 TEXTURES: Final = (3, 9, 21)
 """Sides of the squares over which slopes are averaged."""
 DEVIATION: Final = 9
 """Side of the square in which the log brightness deviates."""
 WINDOWS: Final = (7, 19, 41)
-"""Sides of the squares over which tones are averaged; the first is what is held against others."""
+"""Sides of the squares over which tones are averaged; the first is compared at the offsets."""
 OFFSETS: Final = ((-14, 0), (14, 0), (28, 0), (-28, 0), (0, 20), (0, -20))
-"""Columns and rows to those others. Beyond the border lies what lies there."""
+"""Columns and rows to the squares compared with it. The border is repeated beyond the image."""
 _ACROSS, _DOWN = (max(abs(offset[way]) for offset in OFFSETS) for way in (0, 1))
 
 
 def colour(scene: Scene) -> Named:
     """Return red, green, blue, the tones, their projections, and the distances to the patch.
 
-    A projection of the log-chromaticities on one direction keeps what a change between sunlight and
-    skylight leaves alone. Which direction that is depends on the camera (Alvarez and Lopez 2011),
-    so there are three.
+    A projection of the log-chromaticities on the right direction does not change between sunlight
+    and skylight. That direction depends on the camera (Alvarez and Lopez 2011), so there are three.
     """
     red, blue = (scene.tones[i] - scene.middle[i] for i in (1, 2))
     channels = np.moveaxis(scene.image.astype(np.float32), 2, 0)
@@ -70,23 +69,25 @@ def colour(scene: Scene) -> Named:
 def light(scene: Scene) -> Named:
     """Return log brightness less the lower half's, and the row's; and the row's median colour.
 
-    A second exposure that does not trust the patch: where that lies in the shade of a lorry, the
-    sunlit road is too bright for it, but not for the lower half of the image.
+    It is a second exposure that does not trust the patch: if that lies in the shade of a lorry, the
+    sunlit road is too bright compared with it, but not compared with the lower half of the image.
     """
-    own = scene.tones[0]
+    bright = scene.tones[0]
     return {
         **light_over(scene, *PERCENTILES),
-        "light_over_row": own - own.mean(axis=1, keepdims=True),
+        "light_over_row": bright - bright.mean(axis=1, keepdims=True),
         "colour_distance_of_row": np.median(scene.colour, axis=1, keepdims=True),
     }
 
 
 def light_over(scene: Scene, *percentiles: int) -> Named:
-    """Return log brightness less each percentile of the lower half's, ``(h, w)`` float32."""
-    light = scene.tones[0]
-    levels = np.percentile(light[scene.shape[0] // 2 :], percentiles)
-    names = [f"light_over_{each}th_percentile" for each in percentiles]
-    return {name: light - float(level) for name, level in zip(names, levels, strict=True)}
+    """Return log brightness less percentiles of the lower half's, ``(h, w)`` float32 each."""
+    bright = scene.tones[0]
+    levels = np.percentile(bright[scene.shape[0] // 2 :], percentiles)
+    return {
+        f"light_over_{percentile}th_percentile": bright - float(level)
+        for percentile, level in zip(percentiles, levels, strict=True)
+    }
 
 
 def place(scene: Scene) -> Named:
@@ -100,12 +101,12 @@ def place(scene: Scene) -> Named:
 def texture(scene: Scene) -> Named:
     """Return the root of the mean absolute slope of the log brightness, and its deviation.
 
-    In each window across and down: kerbs, wheels and house fronts have edges of one direction,
-    leaves of both.
+    Slopes across and down are apart in each window: kerbs, wheels and house fronts have edges of
+    one direction, leaves of both.
     """
     slopes = {"across": np.abs(scene.slopes[0]), "down": np.abs(scene.slopes[1])}
-    own = scene.tones[0]
-    variance = mean(own * own, DEVIATION) - np.square(mean(own, DEVIATION))
+    bright = scene.tones[0]
+    variance = mean(bright * bright, DEVIATION) - np.square(mean(bright, DEVIATION))
     return {
         **{f"{w}_{side}": np.sqrt(mean(slopes[w], side)) for side in TEXTURES for w in slopes},
         "deviation": np.sqrt(np.maximum(variance, 0)),
@@ -114,24 +115,24 @@ def texture(scene: Scene) -> Named:
 
 def surroundings(scene: Scene) -> Named:
     """Return means of tones, and differences of means of light, blue-green and colour distance."""
-    named = dict(zip(TONES, scene.tones, strict=True))
-    found = {f"{tone}_{side}": mean(named[tone], side) for side in WINDOWS for tone in TONES}
-    compared = {tone: found[f"{tone}_{WINDOWS[0]}"] for tone in ("light", "blue_green")}
+    tones = dict(zip(TONES, scene.tones, strict=True))
+    planes = {f"{tone}_{side}": mean(tones[tone], side) for side in WINDOWS for tone in TONES}
+    compared = {tone: planes[f"{tone}_{WINDOWS[0]}"] for tone in ("light", "blue_green")}
     compared["colour_distance"] = mean(scene.colour, WINDOWS[0])
     height, width = scene.shape
     for name, plane in compared.items():
         wide = cv2.copyMakeBorder(plane, *(_DOWN,) * 2, *(_ACROSS,) * 2, cv2.BORDER_REPLICATE)
         for across, down in OFFSETS:
             there = wide[_DOWN + down :, _ACROSS + across :][:height, :width]
-            found[f"{name}_to_{across}_{down}"] = plane - there
-    return found
+            planes[f"{name}_to_{across}_{down}"] = plane - there
+    return planes
 
 
 def scans(scene: Scene) -> Named:
-    """Return what `_column` finds below and above, and what is met from the middle outwards.
+    """Return the summaries of `_column` below and above, and extremes from the middle outwards.
 
-    In a row these are the root of the steepest slope across, and the furthest hue. Whoever drives
-    up the column to the pixel meets no kerb and no shadow under a car as long as there is road.
+    In a row these are the root of the steepest slope across, and the furthest hue. A vehicle that
+    drives up the column to the pixel meets no kerb and no shadow under a car while on the road.
     """
     steep = cv2.blur(np.abs(scene.slopes[0]), (3, 5))
     return {
@@ -143,10 +144,10 @@ def scans(scene: Scene) -> Named:
 
 
 def _column(scene: Scene, step: int) -> Named:
-    """Return what is met along each column until a pixel is reached, from below (-1) or above (1).
+    """Summarise each column up to every pixel, from below (``step`` -1) or above (1).
 
-    The root of the steepest slope down, the least and the greatest log brightness, the mean
-    distance of colours to the patch, the greatest of hues, and the sum of edges.
+    The features are the root of the steepest slope down, the least and the greatest log brightness,
+    the mean distance of colours to the patch, the greatest of hues, and the sum of edges.
     """
     light, colour = mean(scene.tones[0], 5)[::step], mean(scene.colour, 3)[::step]
     steep = np.sqrt(cv2.blur(np.abs(scene.slopes[1]), (5, 3)))[::step]
@@ -165,20 +166,20 @@ def _column(scene: Scene, step: int) -> Named:
 def outwards(plane: Values) -> Values:
     """Return the greatest value met along a row from the image's middle to each pixel."""
     half = plane.shape[1] // 2
-    found = np.empty_like(plane)
-    np.maximum.accumulate(plane[:, half:], axis=1, out=found[:, half:])
+    greatest = np.empty_like(plane)
+    np.maximum.accumulate(plane[:, half:], axis=1, out=greatest[:, half:])
     left = np.s_[:, half - 1 :: -1] if half else np.s_[:, :0]
-    found[left] = np.maximum.accumulate(plane[left], axis=1)
-    return found
+    greatest[left] = np.maximum.accumulate(plane[left], axis=1)
+    return greatest
 
 
 def paths(scene: Scene) -> Named:
     """Return the geodesic distances over edges, over edges and hues, and over colours.
 
-    A kerb, a line of parked cars or a change of colour is crossed by every path from the ground in
-    front of the vehicle to what lies behind it, and the cheapest path goes around a mark, a shadow
-    or a drain. So the distance is small on the road wherever it leads, and grows by a step at its
-    edge. With the gradient g of the log brightness a pixel, and the distances h of hues and d of
+    Every path from the ground in front of the vehicle to a place behind a kerb, a line of parked
+    cars or a change of colour crosses it, and the cheapest path goes around a mark, a shadow or a
+    drain. So the distance is small on the road wherever it leads, and grows by a step at its edge.
+    With the gradient g of the log brightness per pixel, and the distances h of hues and d of
     colours to the patch in its deviations, the costs of a pixel are ``g``,
     ``g / 2 + min(h, 10) / 20`` and ``0.03 min(d, 15)``.
     """
@@ -193,28 +194,28 @@ def paths(scene: Scene) -> Named:
 def barriers(scene: Scene) -> Named:
     """Return each barrier at a pixel, on its path from the patch, and from the middle outwards.
 
-    Kerbs, seams, yellow and dark lines: `Scene.barriers`. The distances over the squares of
-    `SQUARED` come last. Each is ``(h, w)`` float32; distances are those of `distance`, in pixels.
+    The barriers are kerbs, seams, yellow and dark lines: `Scene.barriers`. The distances over the
+    squares of `SQUARED` come last. Each is ``(h, w)`` float32; a `distance` is in pixels.
     """
-    found = scene.barriers
+    planes = scene.barriers
     return {
-        **found,
-        **{f"over_{name}": distance(found[name] * w, scene.patch) for name, w in BARRIERS.items()},
-        **{f"{name}_inside": outwards(plane) for name, plane in found.items()},
+        **planes,
+        **{f"over_{name}": distance(planes[name] * w, scene.patch) for name, w in BARRIERS.items()},
+        **{f"{name}_inside": outwards(plane) for name, plane in planes.items()},
         "around_edge": scene.around_edge,
         "around_relative_edge": scene.around("relative_edge"),
     }
 
 
 GROUPS: Final[Mapping[str, Callable[[Scene], Named]]] = {
-    each.__name__: each
-    for each in (barriers, colour, light, paths, place, scans, surroundings, texture)
+    group.__name__: group
+    for group in (barriers, colour, light, paths, place, scans, surroundings, texture)
 }
 
 
 @cache
 def names_of(groups: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of the features of some groups, with the group's before them."""
+    """Return the names of the features of some groups, as ``group.feature``."""
     grey = np.full((24, 32, 3), 128, np.uint8)
     scene = Scene.of(grey, cv2.resize(grey, (64, 48)), ReferencePatch())
     return tuple(f"{group}.{name}" for group in groups for name in GROUPS[group](scene))
@@ -222,37 +223,30 @@ def names_of(groups: tuple[str, ...]) -> tuple[str, ...]:
 
 def features(scene: Scene, groups: tuple[str, ...]) -> Values:
     """Compute the features of some groups, ``(F, h, w)`` float32 in the order of `names_of`."""
-    found = np.empty((len(names_of(groups)), *scene.shape), np.float32)
-    planes = (plane for name in groups for plane in GROUPS[name](scene).values())
-    for place_, plane in zip(found, planes, strict=True):
-        place_[...] = plane
-    return found
+    planes = np.empty((len(names_of(groups)), *scene.shape), np.float32)
+    values = (plane for name in groups for plane in GROUPS[name](scene).values())
+    for plane, feature in zip(planes, values, strict=True):
+        plane[...] = feature
+    return planes
 
 
 SURE: Final = 1 / CERTAIN
-"""The probability nearest to 0 or 1 that a log-odds is computed of."""
+"""The probability nearest to 0 or 1 whose log-odds are computed."""
 
 
-def _planes(opinion: Output) -> tuple[Probability, ...]:
+def _probabilities(opinion: Output) -> tuple[Probability, ...]:
     return opinion.by_class or (() if opinion.probability is None else (opinion.probability,))
-
-
-def _mirrored(opinion: Output) -> Output:
-    assert opinion.mask is not None
-    mask = Packed.of(opinion.mask.pixels()[:, ::-1])
-    planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in _planes(opinion))
-    return Output(mask=mask, by_class=planes)
 
 
 def opinions(opinion: Output, shape: tuple[int, int]) -> Values:
     """Return the log-odds of road of each plane of an opinion, ``(P, h, w)`` float32.
 
-    Of a mask without any it is the signed distance to the mask's edge in pixels of the working
-    image, positive inside. ``shape`` is the working image's height and width.
+    A mask without such planes gives the signed distance to its edge in pixels of the working image,
+    positive inside. ``shape`` is the working image's height and width.
     """
     size = shape[::-1]
-    if planes := _planes(opinion):
-        small = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in planes]
+    if codes := _probabilities(opinion):
+        small = [cv2.resize(plane, size, interpolation=cv2.INTER_AREA) for plane in codes]
         share = np.stack(small).astype(np.float32) * SURE
         return np.log((share + SURE) / (1 - share + SURE))
     assert opinion.mask is not None
@@ -266,11 +260,11 @@ def opinions(opinion: Output, shape: tuple[int, int]) -> Values:
 def at_samples(
     sample: TrainingSet, see: Callable[[Rgb, Output | None], tuple[Scene, Values]]
 ) -> tuple[Values, Values]:
-    """Return the features of the sampled pixels, and of the same in the mirrored images.
+    """Return the features of the sampled pixels, and of the same pixels in the mirrored images.
 
-    Nothing but habit makes traffic keep to one side: the mirror doubles what there is to learn
-    from. Both are ``(n, F)`` float32, in the sample's order; ``see`` returns the scene of an image
-    and what is said of it, and the features, ``(F, h, w)``.
+    A road does not depend on the side of traffic: the mirror doubles the training pixels. Both are
+    ``(n, F)`` float32, in the sample's order. ``see`` takes an image and the opinion on it, and
+    returns the scene and the features, ``(F, h, w)``.
     """
 
     def at(image: Rgb, opinion: Output | None, row: Places, column: Places) -> Values:
@@ -278,26 +272,33 @@ def at_samples(
         _, height, width = planes.shape
         return planes[:, row * height // image.shape[0], column * width // image.shape[1]].T
 
-    found = []
+    parts = []
     heard = sample.opinions or (None,) * len(sample.images)
     for index, (image, opinion) in enumerate(zip(sample.images, heard, strict=True)):
         here = np.flatnonzero(sample.frame == index)
         row, column = sample.row[here], sample.column[here]
-        flipped = np.ascontiguousarray(image[:, ::-1]), opinion and _mirrored(opinion)
+        flipped = np.ascontiguousarray(image[:, ::-1]), opinion and _mirror(opinion)
         opposite = at(*flipped, row, image.shape[1] - 1 - column)
-        found.append((here, at(image, opinion, row, column), opposite))
-    order, straight, mirrored = map(np.concatenate, zip(*found, strict=True))
+        parts.append((here, at(image, opinion, row, column), opposite))
+    order, straight, mirrored = map(np.concatenate, zip(*parts, strict=True))
     back = np.argsort(order)
     return straight[back], mirrored[back]
 
 
+def _mirror(opinion: Output) -> Output:
+    assert opinion.mask is not None
+    mask = Packed.of(opinion.mask.pixels()[:, ::-1])
+    planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in _probabilities(opinion))
+    return Output(mask=mask, by_class=planes)
+
+
 SUNLIT: Final = 80
-"""Of the lower half's log brightness: about that of sunlit ground."""
+"""Percentile of the lower half's log brightness that is about sunlit ground."""
 SHADE, SUN = -0.8, -0.3
-"""Of the natural logarithm of brightness over that percentile: at or below `SHADE` a pixel counts
-as shade, at or above `SUN` as lit."""
+"""Natural logarithms of brightness over that percentile: at or below `SHADE` a pixel counts as
+shade, at or above `SUN` as lit."""
 LIGHT: Final = f"light.light_over_{SUNLIT}th_percentile"
-"""The feature that is the light of a pixel."""
+"""Name of the feature that is the light of a pixel."""
 
 
 def lit(bright: Values) -> Values:
@@ -311,7 +312,7 @@ def lit(bright: Values) -> Values:
 def beyond(far: Values, bright: Values) -> Values:
     """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, times its light.
 
-    A shadow's edge lengthens the way into it, so that in the shade the distance says little. All
+    A shadow's edge lengthens the paths into it, so that in the shade the distance says little. All
     are ``(h, w)`` float32; d is `reach`, s `lit`, ``bright`` the feature `LIGHT`.
     """
     return lit(bright) * np.maximum(far - 1, 0)

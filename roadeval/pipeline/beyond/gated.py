@@ -1,15 +1,16 @@
 """A shadow filter with a learnt gate: dark road becomes as bright as the lit road of its frame.
 
-The paper's filter (`shadow`) takes whatever has a high NDI for shadow. This one asks of every dark
-pixel how likely it is road in the shade, and brightens it so far. There is no region and no hard
-threshold in it: half a doubt is half the gain. Where the training frames have no road in the shade
-nothing is learnt, and every frame passes as it came, bit for bit.
+The paper's filter (`shadow`) takes every pixel with a high NDI for shadow. This one estimates for
+every dark pixel how probable it is road in the shade, and brightens it in proportion: it has no
+regions and no hard threshold. If the training frames show no road in the shade, nothing is learnt,
+and every frame stays unchanged, bit for bit.
 
-A shadow, a dark car and a hedge may have one colour. What tells them apart is learnt, as Guo, Dai
-and Hoiem learn their shadow detector [1]_, but by pixel: a logistic regression on what surrounds a
-dark pixel, on its place, and on what lies between it and the vehicle. All brightness is relative to
-the frame's own sunlit road, so that it holds for any exposure. What follows it sees colours alone,
-and wants the same light in each frame: the stage `exposure` comes before it in the preset.
+A shadow, a dark car and a hedge may have one colour. The filter learns to tell them apart, as the
+shadow detector of Guo, Dai and Hoiem does [1]_, but by pixel: a logistic regression on the
+surroundings of a dark pixel, on its place, and on the ground between it and the vehicle. All
+brightness is relative to the frame's own sunlit road, so that it holds for any exposure. The stages
+after it see colours alone and need the same light in each frame: the stage `exposure` comes before
+it in the preset.
 
 References
 ----------
@@ -34,7 +35,7 @@ from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
 from roadeval.pipeline.reference_patch import ReferencePatch
-from roadeval.pipeline.scene import Scene, enlarged, mean, reduced, stretched
+from roadeval.pipeline.scene import Scene, enlarge, mean, reduce_to, stretch
 from roadeval.pipeline.stage import (
     Output,
     Stage,
@@ -49,36 +50,36 @@ from roadeval.pipeline.stage import (
 GRID: Final = (12, 16)
 """Rows and columns of the cells by which the place of road is learnt."""
 WIDTH: Final = 160
-"""Columns of the working image: wider images are reduced to it for all that is decided. Texture
-then means the same for every camera, and the time is the same too."""
+"""Columns of the working image, to which wider images are reduced for all decisions. Texture then
+means the same for every camera, and the time is the same too."""
 DARKNESS: Final = 0.6
 """Candidates are darker than this share of the sunlit level."""
 PLACE: Final = 0.05
-"""Candidates lie where at least this share of the training pixels is road: sky, trees and houses
+"""Candidates lie where more than this share of the training pixels is road: sky, trees and houses
 are elsewhere."""
 DOUBT: Final = 0.1
-"""Below this probability nothing is brightened."""
+"""Below this probability no pixel is brightened."""
 WINDOWS: Final = (3, 9)
 """Sides of the squares over which texture is averaged."""
 PATCH: Final = ReferencePatch()
 FEATURES: Final = 13 + 2 * len(WINDOWS)
-"""Of a pixel, see `features_of`."""
+"""Number of features of a pixel, see `features_of`."""
 STEPS: Final = 0.05
 """Added to a geodesic distance before the logarithm: ten steps on smooth ground."""
 LEVEL: Final = 0.85
-"""The frame's sunlit level is this quantile of the brightness of where road is likely."""
+"""The frame's sunlit level is this quantile of brightness among pixels that are probably road."""
 LIT: Final = 0.7
 """Lit road is brighter than this share of the sunlit level."""
 OFFSET: Final = 8.0
 """Added to a channel before ratios are taken, as in `LOGS`."""
 LEAST: Final = 30
-"""Candidates of either kind, of those sampled, that there must be to learn from."""
+"""Least number of sampled candidates of either class to learn from."""
 NOTHING: Final = -20.0
-"""The log-odds of every candidate where there was too little to learn from."""
+"""The log-odds of every candidate if there were too few to learn from."""
 PLANES: Final = 128
-"""Planes of the feature map on which the odds are learnt. What a frame costs grows with them."""
+"""Planes of the feature map on which the odds are learnt. The time of a frame grows with them."""
 PENALTY: Final = 0.01
-"""Of the squared weights, a training pixel."""
+"""Penalty of the squared weights per training pixel."""
 GREATEST_GAIN: Final = 8.0
 """Greatest gain of a channel."""
 SOFTNESS: Final = 3
@@ -108,14 +109,14 @@ class GatedSettings:
     """Settings of the gated filter."""
 
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
-    """Factor of the odds that a candidate is shaded road. The more, the more dark road comes back,
-    and the more is brightened that is none. A classifier on colours takes all of that for road,
-    and wants caution; one that sees place and surroundings as well takes 1."""
+    """Factor of the odds that a candidate is shaded road. A greater one brings back more dark road,
+    and brightens more pixels that are not road. A classifier on colours takes all of those for
+    road, and needs a small factor; one that sees place and surroundings as well works with 1."""
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """A working image as the filter sees it."""
+class GatedView:
+    """A working image with its light and its candidates."""
 
     image: Rgb
     """``(h, w, 3)`` uint8 RGB."""
@@ -129,11 +130,11 @@ class Look:
     """``(h, w)`` bool."""
 
 
-def look(image: Rgb, place: Floats) -> Look:
+def look(image: Rgb, place: Floats) -> GatedView:
     """Find the sunlit level, lit road's colour and the candidates of a working image.
 
-    Where road is likely by its place alone, nearly every frame has some that is lit: that level is
-    within a tenth of the true one, where the colour of road finds a third.
+    Nearly every frame has some lit road among the pixels that are probably road by place alone: the
+    level found there is within a tenth of the true one; by the colour of road, within a third.
     """
     height, width = image.shape[:2]
     total = sum(cv2.split(image.astype(np.uint16)))
@@ -143,17 +144,17 @@ def look(image: Rgb, place: Floats) -> Look:
     level = float(np.searchsorted(counted, LEVEL * counted[-1])) if counted[-1] > 0 else 0.0
     lit = np.array(cv2.mean(image, (likely & (total >= LIT * level)).view(np.uint8))[:3])
     candidates = (total < DARKNESS * level) & (share > PLACE)
-    return Look(image, level, lit, share, candidates)
+    return GatedView(image, level, lit, share, candidates)
 
 
-def features_of(seen: Look) -> Values:
+def features_of(seen: GatedView) -> Values:
     """Compute the features of every pixel, ``(F, h, w)`` float32.
 
-    Log brightness and two log-chromaticities relative to those of lit road; the two as they are;
-    the distance from the middle column, and the row; the steepest edge across the column below and
-    the darkest in it, relative to the sunlit level; texture, for each window the root of the mean
-    absolute slope across and down; the logarithms of the geodesic distances from the reference
-    patch (`features.paths`); and the road's share by place.
+    These are log brightness and two log-chromaticities relative to those of lit road; the two
+    unchanged; the distance from the middle column, and the row; the steepest edge across the column
+    below and the darkest pixel in it, relative to the sunlit level; texture, for each window the
+    root of the mean absolute slope across and down; the logarithms of the geodesic distances from
+    the reference patch (`features.paths`); and the road's share by place.
     """
     scene = Scene.of(seen.image, seen.image, PATCH)
     light, red, blue = scene.tones
@@ -185,7 +186,7 @@ class ShadedRoad:
     """Learnt parameters of the gated filter: where road is, and the odds of road in the shade."""
 
     place: Floats
-    """``GRID`` float64: by cell of the image, the share of the training pixels that is road."""
+    """``GRID`` float64: for each cell of the image the share of training pixels that are road."""
     planes: Values
     """``(K, F)`` float32."""
     bias: Values
@@ -208,7 +209,7 @@ def fit(sample: TrainingSet, _settings: GatedSettings) -> ShadedRoad:
     values, labels = [], []
     for index, image in enumerate(sample.images):
         here = sample.frame == index
-        seen = look(reduced(image, WIDTH), place)
+        seen = look(reduce_to(image, WIDTH), place)
         rows, columns = seen.candidates.shape
         row = sample.row[here] * rows // image.shape[0]
         column = sample.column[here] * columns // image.shape[1]
@@ -226,9 +227,9 @@ def fit(sample: TrainingSet, _settings: GatedSettings) -> ShadedRoad:
 
 
 def learn_place(sample: TrainingSet) -> Floats:
-    """Return the share of the training pixels in each cell that is road, both halves alike.
+    """Return the share of training pixels in each cell that are road; the halves are symmetric.
 
-    One pixel of either class more keeps a cell that was hardly seen undecided.
+    One more pixel of either class keeps cells with few pixels undecided.
     """
     height, width = np.array([image.shape[:2] for image in sample.images]).T
     row = sample.row * GRID[0] // height[sample.frame]
@@ -257,13 +258,11 @@ def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
 def logistic(mapped: Floats, road: Flags, penalty: float) -> tuple[Floats, float]:
     """Fit a logistic regression with an L2 penalty, by Newton's method.
 
-    scikit-learn's gives the same weights, and its import alone takes a second.
-
-    The weights w of standardised columns z and the offset b minimise the mean of ``ln(1 + exp(-s (w
-    . z + b)))``, s being 1 for road and -1 for the rest, plus ``penalty / 2 |w|^2``; returned are
-    those of the columns as they are. ``mapped`` is ``(n, K)``, ``road`` ``(n,)``, of which both
-    classes occur; ``penalty`` is above 0. Returned are the weights, ``(K,)`` float64, and the
-    offset.
+    scikit-learn's gives the same weights, and its import alone takes a second. The weights w of
+    standardised columns z and the offset b minimise the mean of ``ln(1 + exp(-s (w . z + b)))``, s
+    being 1 for road and -1 for the rest, plus ``penalty / 2 |w|^2``. ``mapped`` is ``(n, K)``;
+    ``road`` is ``(n,)``, and both classes occur; ``penalty`` is above 0. Returned are the weights
+    of the unscaled columns, ``(K,)`` float64, and the offset.
     """
     mean, deviation = mapped.mean(axis=0), np.maximum(mapped.std(axis=0), 1e-6)
     columns = np.column_stack([(mapped - mean) / deviation, np.ones(len(mapped))])
@@ -277,14 +276,14 @@ def logistic(mapped: Floats, road: Flags, penalty: float) -> tuple[Floats, float
         weights -= step
         if np.abs(step).max() < 1e-6:
             break
-    own = weights[:-1] / deviation
-    return own, float(weights[-1] - mean @ own)
+    unscaled = weights[:-1] / deviation
+    return unscaled, float(weights[-1] - mean @ unscaled)
 
 
-def probability(seen: Look, model: ShadedRoad, odds: float) -> Values:
+def probability(seen: GatedView, model: ShadedRoad, odds: float) -> Values:
     """Return the probability of every pixel to be road in the shade, ``(h, w)`` float32.
 
-    0 where there is no candidate.
+    It is 0 except at candidates.
     """
     result: Values = np.zeros(seen.candidates.shape, np.float32)
     if seen.candidates.any():
@@ -298,26 +297,25 @@ def _sigmoid(values: Any) -> Any:
     return 1 / (1 + np.exp(-np.clip(values, -30, 30)))
 
 
-def gains(seen: Look, shaded: Values) -> Values:
+def gains(seen: GatedView, shaded: Values) -> Values:
     """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
 
-    It is ``(L / S)^p``: L is the mean colour of lit road, S that of the pixel, and p the
-    probability that it is road in the shade, 0 where it is no candidate. L / S is the ratio of
-    illumination if it is. No gain is less than 1 or more than `GREATEST_GAIN`. In the end they are
-    averaged over a square.
+    It is ``(L / S)^p``: L is the mean colour of lit road, S the colour of the pixel, and p the
+    probability that it is road in the shade, 0 except at candidates. For such road, L / S is the
+    ratio of illumination. Each gain lies in 1..`GREATEST_GAIN`; then gains are averaged over a
+    square.
     """
-    own = np.log(seen.image.astype(np.float32) + OFFSET)
-    ratio = np.clip(
-        np.log((seen.lit + OFFSET).astype(np.float32)) - own, 0, math.log(GREATEST_GAIN)
-    )
+    lit = np.log((seen.lit + OFFSET).astype(np.float32))
+    dark = np.log(seen.image.astype(np.float32) + OFFSET)
+    ratio = np.clip(lit - dark, 0, math.log(GREATEST_GAIN))
     return cv2.blur(np.exp(ratio * shaded[..., None]), (SOFTNESS, SOFTNESS))
 
 
 def brighten(image: Rgb, gain: Values) -> Rgb:
     """Return ``(I + 8) g - 8`` of ``(H, W, 3)`` uint8 RGB; rounded and clipped.
 
-    Gains ``(h, w, 3)`` float32, none below 1, are of colours with `OFFSET` added: noise in the dark
-    does not grow by all of them.
+    The gains ``(h, w, 3)`` float32, none below 1, multiply colours with `OFFSET` added, so that
+    noise in the dark grows less.
     """
     bright = image.copy()
     if len(touched := np.flatnonzero((gain > 1).any(axis=(1, 2)))):
@@ -325,7 +323,7 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
         # Interpolation reaches no further than to the next row.
         first, end = int((touched[0] - 1) * scale), math.ceil((touched[-1] + 2) * scale)
         rows = slice(max(first, 0), end)
-        here = stretched(gain, image.shape)[rows]
+        here = stretch(gain, image.shape)[rows]
         result = cv2.multiply(image[rows], here, dtype=cv2.CV_32F)
         cv2.scaleAdd(here, OFFSET, result, dst=result)
         cv2.convertScaleAbs(result, dst=bright[rows], beta=-OFFSET)
@@ -334,9 +332,9 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
 
 @per_view
 def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
-    """Filter what is seen."""
+    """Filter the image of a view."""
     shape = view.image.shape
-    seen = look(reduced(view.image, WIDTH), model.place)
+    seen = look(reduce_to(view.image, WIDTH), model.place)
     likely = probability(seen, model, settings.odds)
     shaded = np.maximum((likely - DOUBT) / (1 - DOUBT), 0)
     gain = gains(seen, shaded)
@@ -344,13 +342,13 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     small = (shaded > 0.5).view(np.uint8)
     edge = cv2.dilate(small, np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) - small
     masks = {"shadow": small, "shadow_edge": edge, "lit": 1 - (small | edge)}
-    regions = {name: Packed.of(enlarged(mask, shape)) for name, mask in masks.items()}
+    regions = {name: Packed.of(enlarge(mask, shape)) for name, mask in masks.items()}
     return Output(
         layers=(
-            Layer(CANDIDATES, enlarged(seen.candidates.view(np.uint8), shape)),
-            Layer(SHADED, stretched(shaded, shape)),
+            Layer(CANDIDATES, enlarge(seen.candidates.view(np.uint8), shape)),
+            Layer(SHADED, stretch(shaded, shape)),
             Layer(SHADOW, regions["shadow"]),
-            Layer(GAIN, stretched(np.maximum.reduce(cv2.split(gain)), shape)),
+            Layer(GAIN, stretch(np.maximum.reduce(cv2.split(gain)), shape)),
             Layer(COMPENSATED, image),
         ),
         image=image,
@@ -359,9 +357,9 @@ def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
 
 
 def oracle(_settings: GatedSettings, model: ShadedRoad, view: View, truth: Truth) -> Output:
-    """Brighten what is truly shadow."""
-    small = reduced(view.image, WIDTH)
-    shadow = enlarged((truth == 1).view(np.uint8), small.shape)
+    """Brighten the true shadow."""
+    small = reduce_to(view.image, WIDTH)
+    shadow = enlarge((truth == 1).view(np.uint8), small.shape)
     gain = gains(look(small, model.place), shadow.astype(np.float32))
     return Output(image=brighten(view.image, gain) if shadow.any() else view.image)
 

@@ -1,4 +1,4 @@
-"""Road as another method has found it: its masks in the log, or beside it, as a stage."""
+"""Another method's road masks, in the log or beside it, as a stage."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ class GivenSettings:
     """Settings of another method's masks as a stage."""
 
     name: str = ""
-    """The variant whose masks they are, one of ``[masks]`` or ``topics.masks``."""
+    """Variant that the masks belong to, one of ``[masks]`` or ``topics.masks``."""
 
 
 @per_view
 def bind(settings: GivenSettings, _learnt: None, view: View) -> Output:
-    """Return the mask of what is seen; an `AbsentError` for a frame without."""
-    found = view.given.get(settings.name)
-    if found is None or found.mask is None:
-        which = f"frame {view.moment.number}" if view.moment else "the image"
-        raise AbsentError(f"given: {which} has no mask of {settings.name}")
-    return replace(found, layers=(Layer(GIVEN, found.mask),))
+    """Return the method's mask of the frame; an `AbsentError` if there is none."""
+    output = view.external.get(settings.name)
+    if output is None or output.mask is None:
+        frame = f"frame {view.moment.number}" if view.moment else "the image"
+        raise AbsentError(f"given: {frame} has no mask of {settings.name}")
+    return replace(output, layers=(Layer(GIVEN, output.mask),))
 
 
 STAGE: Final = Stage(

@@ -1,13 +1,14 @@
-"""Road by a network, from an ONNX file that somebody has trained elsewhere."""
+"""Road by a network from an ONNX file, trained elsewhere."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
+from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.networks import NetSettings, Network, NetworkError
 from roadeval.pipeline.stage import Output, Stage, StageError, View
 
@@ -18,22 +19,18 @@ PROBABILITY: Final = LayerSpec(
 
 
 def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return the network as a pure function of what it sees; a `NetworkError`, see `Network.of`."""
+    """Return the network as a pure function of a view; a `NetworkError`, see `Network.of`."""
     network = Network.of(settings)
 
     def run(view: View) -> Output:
         try:
-            road = network.road(view.image)
+            output = network.road(view.image)
         except NetworkError as error:
             raise StageError(f"net: {error}") from error
-        mask = Packed.of(road.mask)
-        levels = (road.codes >> 8).astype(np.uint8)
-        return Output(
-            (Layer(PROBABILITY, levels), Layer(NET, mask)),
-            mask=mask,
-            probability=road.codes if road.graded else None,
-            by_class=road.by_class,
-        )
+        assert output.mask is not None
+        codes = output.probability
+        levels = 255 * output.mask.pixels() if codes is None else (codes >> 8).astype(np.uint8)
+        return replace(output, layers=(Layer(PROBABILITY, levels), Layer(NET, output.mask)))
 
     return run
 

@@ -29,24 +29,24 @@ class ThresholdSettings:
 
 @dataclass(frozen=True)
 class Threshold:
-    """What the training frames chose."""
+    """The threshold with the fewest errors on the training frames."""
 
     code: int
-    """Road is what is more probable, 0..65535."""
+    """Pixels with a greater code of probability, 0..65535, are road."""
 
     def __post_init__(self) -> None:
         check_range("code", self.code, 0, CERTAIN)
 
 
 def codes_of(opinion: Output | None) -> Probability:
-    """Return how probable road is by the stage before; a `StageError` if that does not say so."""
+    """Return the codes of probability of the stage before; a `StageError` if it has none."""
     if opinion is None or opinion.probability is None:
         raise StageError("threshold: the stage before does not say how probable road is")
     return opinion.probability
 
 
 def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
-    """Choose the threshold with the fewest wrong pixels, of all that are labelled."""
+    """Choose the threshold with the fewest wrong pixels among all labelled ones."""
     pairs = zip(sample.opinions, sample.truths, strict=True)
     counts = [histogram(codes_of(opinion), truth) for opinion, truth in pairs]
     return Threshold(best_code(np.sum(counts, axis=0)))
@@ -54,7 +54,7 @@ def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
 
 @per_view
 def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
-    """Return where road is more probable than that by the stage before."""
+    """Return the pixels where road is more probable than the threshold."""
     road = Packed.of(codes_of(view.opinion) > learnt.code)
     facts = {"threshold": learnt.code / CERTAIN}
     return Output((Layer(THRESHOLD, road),), mask=road, facts=facts)

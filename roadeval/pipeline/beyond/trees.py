@@ -1,8 +1,8 @@
-"""Boosted trees on what is known of a pixel of the ground: how probable road is.
+"""Boosted trees on the features of a pixel: how probable road is.
 
 The log-odds of road are the weighted mean of two opinions: the sum of many small decision trees,
-each of which was grown to mend what those before it leave [1]_, and a network with one hidden layer
-(`hidden_layer`). A term that is not learnt is taken from them:
+each grown to correct the errors of the trees before it [1]_, and a network with one hidden layer
+(`hidden_layer`). A term that is not learnt is subtracted:
 ``x = mean - w s max(d - 1, 0)`` with the distance d from the reference patch, 1 where roads end,
 and the share s of light (`roadeval.pipeline.beyond.features`); ``p = 1 / (1 + exp(-x))``. It is
 computed on a working image, and interpolated linearly to the camera's pixels.
@@ -42,7 +42,7 @@ from roadeval.pipeline.beyond.features import (
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
-from roadeval.pipeline.scene import Scene, reach, scene_of, stretched
+from roadeval.pipeline.scene import Scene, reach, scene_of, stretch
 from roadeval.pipeline.stage import (
     GREATEST,
     MisfitError,
@@ -60,20 +60,20 @@ from roadeval.pipeline.stage import (
 Sizes = npt.NDArray[np.int32]
 
 NODES: Final = LEAVES
-"""Places for the nodes of a tree, which uses ``LEAVES - 1`` at most. Nothing exceeds the threshold
-of the others."""
+"""Places for the nodes of a tree, which uses at most ``LEAVES - 1``. No feature exceeds the
+threshold of the unused ones."""
 ALL: Final = (1 << LEAVES) - 1
 """The bits of all leaves."""
 BINS: Final = 255
-"""Ranges of a feature that a tree can tell apart: the most that scikit-learn knows."""
+"""Ranges of a feature that a tree can tell apart, the most that scikit-learn allows."""
 RATE: Final = 0.1
-"""Share of what is left to mend that a tree mends."""
+"""Share of the remaining error that a tree corrects."""
 MOST_LEAVES: Final = 31
-"""Of a tree."""
+"""Greatest number of leaves of a tree."""
 LEAST: Final = 50
-"""Training pixels of a leaf, mirrored ones included."""
+"""Least number of training pixels in a leaf, mirrored ones included."""
 SHARE: Final = 0.33
-"""Of the features, drawn anew for each node, among which it chooses."""
+"""Share of the features among which a node chooses; each node draws its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,17 +81,17 @@ class Forest:
     """The sum of T trees, see `roadeval.kernels.plain.tree_sum`."""
 
     feature: Indices
-    """``(T, NODES)`` int32: which feature a node looks at."""
+    """``(T, NODES)`` int32: the feature that a node looks at."""
     threshold: Values
-    """``(T, NODES)`` float32: what the node compares it with."""
+    """``(T, NODES)`` float32: the number that the node compares it with."""
     kept: Masks
-    """``(T, NODES)`` uint32: a bit for each leaf that is left where the feature is above that."""
+    """``(T, NODES)`` uint32: a bit for each leaf that remains if the feature is above it."""
     values: Values
-    """``(T, LEAVES)`` float32: what each leaf adds."""
+    """``(T, LEAVES)`` float32: the number that each leaf adds."""
     offset: float
-    """Where the sum begins."""
+    """Start of the sum."""
     inputs: int
-    """How many features of a pixel there were to choose from."""
+    """Number of features that there were to choose from."""
 
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, feature=("T", NODES))
@@ -111,20 +111,22 @@ class Forest:
 def grow(values: Values, road: Flags, weights: Floats | None, trees: int, seed: int) -> Forest:
     """Grow trees with scikit-learn's gradient boosting on histograms.
 
-    By one thread: sums of many threads end with other last digits from one run to the next.
-    ``values`` are ``(n, F)`` finite features, ``road`` ``(n,)`` labels, of which both occur;
-    ``weights`` are ``(n,)`` above 0, None where all pixels weigh the same. ``trees`` is their
-    number, ``seed`` draws the features among which a node chooses.
+    One thread grows them: the last digits of sums by many threads differ from run to run.
+    ``values`` are ``(n, F)`` finite features; ``road`` are ``(n,)`` labels, and both occur;
+    ``weights`` are ``(n,)`` and above 0, None if all pixels weigh the same. ``trees`` is their
+    number, ``seed`` that of the features among which a node chooses.
     """
+    from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits
 
     # scikit-learn's own weighted quantiles take several times as long as all trees.
     parts = np.arange(1, BINS) / BINS
     quantiles = np.quantile(values, parts, axis=0, weights=weights, method="inverted_cdf")
     edges = [np.unique(feature) for feature in quantiles.T]
-    bins = [np.searchsorted(*each).astype(np.uint8) for each in zip(edges, values.T, strict=True)]
-    # Only here: the import takes a second, and a model from a file does not need it.
-    from sklearn.ensemble import HistGradientBoostingClassifier
+    bins = [
+        np.searchsorted(bounds, feature).astype(np.uint8)
+        for bounds, feature in zip(edges, values.T, strict=True)
+    ]
 
     boosting = HistGradientBoostingClassifier(
         learning_rate=RATE,
@@ -137,13 +139,23 @@ def grow(values: Values, road: Flags, weights: Floats | None, trees: int, seed: 
     )
     with threadpool_limits(1, "openmp"):
         boosting.fit(np.stack(bins, axis=1), road, sample_weight=weights)
-    grown = [_arrays(tree.nodes, edges) for (tree,) in boosting._predictors]
-    feature, threshold, kept, leaves = map(np.stack, zip(*grown, strict=True))
-    offset = boosting._baseline_prediction.item()
+    offset, grown = nodes_of(boosting)
+    rows = [tree_rows(nodes, edges) for nodes in grown]
+    feature, threshold, kept, leaves = map(np.stack, zip(*rows, strict=True))
     return Forest(feature, threshold, kept, leaves, offset, values.shape[1])
 
 
-def _arrays(
+def nodes_of(boosting: Any) -> tuple[float, list[npt.NDArray[Any]]]:
+    """Return the start of the sum and the nodes of each tree of scikit-learn's classifier.
+
+    They are private there, and read here alone. A model file must hold plain arrays, and
+    scikit-learn's public way is a pickle, which can run code. Its ``decision_function`` also takes
+    0.55 s of CPU for a frame, `Forest.sums` 0.008 s.
+    """
+    return boosting._baseline_prediction.item(), [tree.nodes for (tree,) in boosting._predictors]
+
+
+def tree_rows(
     nodes: npt.NDArray[Any], edges: Sequence[Values]
 ) -> tuple[Indices, Values, Masks, Values]:
     """Return a tree on bins as a row of each of a forest's arrays; its root comes first."""
@@ -173,11 +185,11 @@ def _leaves(nodes: npt.NDArray[Any], root: int) -> Iterator[int]:
 
 
 IN_LIGHT, IN_SHADE = 2 / 3, 1 / 3
-"""The network's weight."""
+"""Weight of the network in the mean."""
 OWN_CAMERA, OTHERS = 1.0, 4.0
-"""``reach_weight`` where the camera itself taught the trees, and where others did."""
+"""``reach_weight`` for a camera whose images taught the trees, and for any other."""
 FARTHEST: Final = 3.0
-"""Of the distances from the patch as they are shown."""
+"""Greatest distance from the patch that is shown."""
 
 TREES: Final = mask_spec("trees", "Road by boosted trees")
 PROBABILITY: Final = LayerSpec(
@@ -201,21 +213,21 @@ class TreesSettings:
     features: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(GROUPS)
     """Groups of features, see `roadeval.pipeline.beyond.features`."""
     opinion: bool = False
-    """Whether what the stage before says of a pixel is a feature, too: its log-odds of road, or the
+    """Whether the output of the stage before is a feature, too: its log-odds of road, or the
     distance to its mask's edge."""
     trees: Annotated[int, Field(ge=1, le=10_000)] = 150
     """Number of trees. The time of a decision grows with it."""
     reach_weight: Annotated[float, Field(ge=0, le=100)] | None = None
-    """``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
-    the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
-    the shade. By default it is 1 where images of the frame's size taught the trees, which are
-    taken for the camera's own, and 4 where other cameras did: there it may mend much."""
+    """``reach_weight`` times ``s max(d - 1, 0)`` is subtracted from the log-odds. The distance d
+    from the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
+    the shade. Default: 1 if images of the frame's size taught the trees, which are taken for the
+    camera's own; 4 if other cameras taught them: there it may correct much."""
     threshold: Share = 0.5
-    """A pixel is road where it is more probable than this."""
+    """A pixel is road if its probability of road is above this."""
 
     @field_validator("features")
     @classmethod
-    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+    def _check_features(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         if len({*names} & GROUPS.keys()) < len(names):
             raise ValueError(f"must be groups among {', '.join(GROUPS)}, each once")
         return names
@@ -228,31 +240,31 @@ class Blend:
     forest: Forest
     network: HiddenLayer
     sizes: Sizes
-    """``(n, 2)`` int32: height and width of the images that taught them, each once."""
+    """``(n, 2)`` int32: the different heights and widths of the images that taught them."""
     base: Blend | None = None
-    """The one of other drives, whose log-odds are the last feature of these."""
+    """The blend of other drives; its log-odds are the last feature."""
 
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, sizes=("n", 2))
         check_range("sizes", self.sizes, 1, GREATEST)
-        own = self.network.inputs
-        if self.forest.inputs != own or (self.base and self.base.inputs != own - 1):
+        inputs = self.network.inputs
+        if self.forest.inputs != inputs or (self.base and self.base.inputs != inputs - 1):
             raise ValueError("forest, network and base take different numbers of features")
 
     @property
     def inputs(self) -> int:
-        """How many features of a pixel are given to it."""
+        """Number of features of a pixel that it takes."""
         return self.base.inputs if self.base else self.network.inputs
 
     def knows(self, image: Rgb) -> bool:
-        """Return whether images of the size of one taught it, or what it stands on."""
-        own = (self.sizes == image.shape[:2]).all(axis=1).any()
-        return bool(own or (self.base and self.base.knows(image)))
+        """Return whether images of this size taught it or its base."""
+        is_known = (self.sizes == image.shape[:2]).all(axis=1).any()
+        return bool(is_known or (self.base and self.base.knows(image)))
 
     def log_odds(self, values: Values, weight: Values | float) -> Values:
         """Return the weighted mean of both for each pixel of ``(inputs, n)`` features, ``(n,)``.
 
-        The weight, 0 to 1, is the network's: one, or ``(n,)``; the base takes the same.
+        ``weight`` is the network's, 0 to 1: one number, or ``(n,)``. The base uses the same.
         """
         if self.base is not None:
             values = np.concatenate([values, self.base.log_odds(values, weight)[None]])
@@ -263,66 +275,67 @@ class Blend:
 def see(settings: TreesSettings, image: Rgb, opinion: Output | None = None) -> tuple[Scene, Values]:
     """Return the scene of ``(H, W, 3)`` uint8 RGB, and its features, ``(F, h, w)`` float32.
 
-    Those of the opinion come last, where the settings ask for it.
+    The features of the opinion come last, if the settings ask for it.
     """
     scene = scene_of(image, settings.width, ReferencePatch())
-    own = features(scene, settings.features)
+    planes = features(scene, settings.features)
     if not settings.opinion:
-        return scene, own
+        return scene, planes
     if opinion is None:
         raise StageError("trees: `opinion` asks for a stage before it that makes a road mask")
-    return scene, np.concatenate([own, opinions(opinion, scene.shape)])
+    return scene, np.concatenate([planes, opinions(opinion, scene.shape)])
 
 
 def fit(sample: TrainingSet, settings: TreesSettings, base: Blend | None = None) -> Blend:
     """Grow the trees, and train the network, on the sampled pixels and their mirror images.
 
-    The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
-    the classes weigh as much as they have there. What ``base`` says of a pixel is one more feature.
+    The sample has as many pixels of road as of the rest. If the frames' share of road is known, the
+    classes get the weights that they have in the frames. The output of ``base`` is one more
+    feature.
     """
     values = np.concatenate(at_samples(sample, partial(see, settings)))
     if base is not None:
         by_feature = np.ascontiguousarray(values.T)
-        known = base.log_odds(by_feature, network_weight(by_feature, settings))
-        values = np.column_stack([values, known])
+        odds = base.log_odds(by_feature, network_weight(by_feature, settings))
+        values = np.column_stack([values, odds])
     road = np.concatenate([sample.road, sample.road])
-    weights = None if sample.share is None else balanced_back(road, sample.share)
+    weights = None if sample.share is None else class_weights(road, sample.share)
     forest = grow(values, road, weights, settings.trees, sample.seed)
     network = train(values, road, weights, sample.seed)
-    sizes = np.unique(np.array([each.shape[:2] for each in sample.images], np.int32), axis=0)
+    sizes = np.unique(np.array([image.shape[:2] for image in sample.images], np.int32), axis=0)
     return Blend(forest, network, sizes, base)
 
 
-def adapt(known: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
-    """Learn from a drive's own pixels, on top of what is known already."""
-    if known.base is not None:
+def adapt(base: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
+    """Learn from a drive's own pixels, on top of the model of other drives."""
+    if base.base is not None:
         raise MisfitError("the model was adapted to a drive already; train it again")
-    check_fit(known, settings)
-    return fit(sample, settings, known)
+    check_fit(base, settings)
+    return fit(sample, settings, base)
 
 
-def balanced_back(road: Flags, share: float) -> Floats:
-    """Return weights ``(n,)`` with mean 1, by which a share of the ``(n,)`` pixels is road."""
-    own = road.mean()
-    return np.where(road, share / own, (1 - share) / (1 - own))
+def class_weights(road: Flags, share: float) -> Floats:
+    """Return weights ``(n,)`` with mean 1 that make the weighted share of road ``share``."""
+    sampled = road.mean()
+    return np.where(road, share / sampled, (1 - share) / (1 - sampled))
 
 
 def check_fit(learnt: Blend, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
-    known = len(names_of(settings.features))
-    if settings.opinion == (learnt.inputs == known) or learnt.inputs < known:
+    computed = len(names_of(settings.features))
+    if settings.opinion == (learnt.inputs == computed) or learnt.inputs < computed:
         raise MisfitError(
             f"the model's trees were grown on {learnt.inputs} features of a pixel, and this "
-            f"version computes {known}; train it again"
+            f"version computes {computed}; train it again"
         )
 
 
 def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     """Return the network's weight in the mean for ``(F, n)`` features, ``(n,)`` float32.
 
-    Trees that fit their few frames to the last pixel are surer of themselves than they should be,
-    by a factor of two or more, and would outvote the network: it has two thirds in the light, and
-    one third in the shade, where it misses more road.
+    Trees that fit their few frames to the last pixel are over-confident by a factor of two or more,
+    and would outvote the network. So it has two thirds in the light, and one third in the shade,
+    where it misses more road.
     """
     names = names_of(settings.features)
     if LIGHT not in names:
@@ -331,7 +344,7 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
 
 
 def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
-    """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
+    """Return the trees as a pure function of a view; a `MisfitError`, see `check_fit`."""
     check_fit(learnt, settings)
     _, share_spec, _ = layers(settings)
 
@@ -349,11 +362,11 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
             weight = OWN_CAMERA if learnt.knows(view.original) else OTHERS
         values = planes.reshape(len(planes), -1)
         odds = learnt.log_odds(values, network_weight(values, settings)).reshape(scene.shape)
-        share = stretched(sigmoid(odds - weight * beyond(far, light)), shape)
+        share = stretch(sigmoid(odds - weight * beyond(far, light)), shape)
         codes = np.rint(share * CERTAIN).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * CERTAIN))
         shown = (
-            Layer(GEODESIC, stretched(far, shape)),
+            Layer(GEODESIC, stretch(far, shape)),
             Layer(share_spec, (codes >> 8).astype(np.uint8)),
             Layer(TREES, road),
         )
@@ -363,7 +376,7 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
 
 
 def layers(settings: TreesSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers; the stage before has a ``probability`` of its own where it is heard."""
+    """Return the layers; if the stage before is heard, it has a ``probability`` of its own."""
     share = replace(PROBABILITY, name="tuned_probability") if settings.opinion else PROBABILITY
     return GEODESIC, share, TREES
 

@@ -18,8 +18,7 @@ from roadeval.kernels import KERNELS
 from roadeval.pipeline.stage import Output, Stage, View, stage_settings
 
 LINE: Final = 3
-"""Side of the square that erodes the result for its boundary (Eq. 22), which gives a line one pixel
-wide."""
+"""Side of the square that erodes the result for its boundary (Eq. 22), a line one pixel wide."""
 POST: Final = mask_spec("post", "Road (Eq. 17-23)")
 BOUNDARY: Final = mask_spec(
     "boundary", "Road boundary (Eq. 22)", none=colours.CLEAR, boundary=(*colours.BOUNDARY, 255)
@@ -34,19 +33,19 @@ class PostSettings:
     """Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 % of the
     image's width, at least 3."""
     operations: tuple[Literal["open", "close"], ...] = ("open", "close")
-    """``open`` (Eq. 20) and ``close`` (Eq. 21) in the order they are applied. Section 4.4 begins
-    with dilation and erosion, a closing. On a noisy mask that joins the road to whatever lies
-    beside it, for good: without the filter it costs 4 and 10 points of ERR on two real drives
-    (on three synthetic ones it gains 8 and 6 and costs 1). So the opening comes first here; the
-    presets ``printed_order`` and ``printed`` close first."""
+    """``open`` (Eq. 20) and ``close`` (Eq. 21) in the order of application. Section 4.4 begins with
+    dilation and erosion, a closing. On a noisy mask a closing joins the road to its surroundings,
+    and no opening parts them again: without the filter it costs 4 and 10 points of ERR on two real
+    drives (on three synthetic ones it gains 8 and 6 and costs 1). So the opening comes first here;
+    the presets ``printed_order`` and ``printed`` close first."""
     region: Literal["largest", "all"] = "largest"
     """Components to keep: the ``largest``, or ``all``."""
     fill: bool = True
-    """Whether the holes of what is kept are filled (Eq. 23)."""
+    """Whether the holes of the kept components are filled (Eq. 23)."""
 
     @field_validator("element")
     @classmethod
-    def _odd(cls, side: int | None) -> int | None:
+    def _check_element(cls, side: int | None) -> int | None:
         if side is not None and side % 2 == 0:
             raise ValueError("must be odd, so that the element has a centre")
         return side
@@ -103,16 +102,16 @@ def boundary(mask: Packed, element: Reach) -> Packed:
 def keep_region(mask: Packed) -> Packed:
     """Keep the largest 8-connected component ("largest and connected areas", section 3.4).
 
-    Of equals the first from the top. An empty mask stays empty.
+    The first from the top wins a tie. An empty mask stays empty.
     """
     return Packed(KERNELS.keep_region(mask.bits, mask.width), mask.width)
 
 
 def fill_holes(mask: Packed) -> Packed:
-    """Fill what the mask encloses: Eq. 23's fixed point from a seed J in every hole.
+    """Fill the holes of the mask: Eq. 23's fixed point from a seed J in every hole.
 
-    A hole is a 4-connected set of non-road that does not reach the outside of the image; B is
-    the cross, which cannot slip between diagonal neighbours of an 8-connected boundary.
+    A hole is a 4-connected set of non-road that does not reach the border of the image; B is the
+    cross, which cannot slip between diagonal neighbours of an 8-connected boundary.
     """
     return Packed(KERNELS.fill_holes(mask.bits, mask.width), mask.width)
 

@@ -1,7 +1,7 @@
 """Phase 2, the shadow filter (section 3.2): finds shadow and gives it the colours around it.
 
-Hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8), components and
-buffer rings (Eq. 9-10), their compensation (Eq. 11), the stage.
+It has hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8),
+components and buffer rings (Eq. 9-10), their compensation (Eq. 11), and the stage.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ class ShadowSettings:
     """``otsu``: the between-class variance of Otsu (1979); ``printed``: Eq. 7 with the definitions
     printed beside it, which lands at the edge of the histogram."""
     inclusive: bool = False
-    """Whether the threshold's own code is shadow, as printed in Eq. 8. Otsu's upper class begins
-    above it."""
+    """Whether the code of the threshold itself is shadow, as printed in Eq. 8. Otsu's upper class
+    begins above it."""
     connectivity: Literal[4, 8] = 8
     """Neighbours that make one component (Eq. 9): 8 or 4."""
     ring_width: Annotated[int, Field(ge=1, le=16)] = 1
@@ -69,8 +69,8 @@ class ShadowSettings:
     """``deviation``: ``mu_ring + (I - mu) * sigma_ring / sigma``, which gives the component its
     ring's mean and standard deviation; ``printed``: Eq. 11 literally, variances and inverted."""
     colour_space: Literal["rgb", "hsi"] = "rgb"
-    """Where the compensation happens: ``rgb``, or ``hsi`` (S and V of Eq. 3-5, hue kept, converted
-    back as step 5 of section 4.2 says)."""
+    """Colour space of the compensation: ``rgb``, or ``hsi`` (S and V of Eq. 3-5, hue unchanged,
+    converted back by step 5 of section 4.2)."""
 
 
 def value(rgb: Plane) -> Floats:
@@ -79,7 +79,7 @@ def value(rgb: Plane) -> Floats:
 
 
 def saturation(rgb: Plane) -> Floats:
-    """Return S of ``(..., 3)`` uint8 RGB: ``1 - 3 min / (R + G + B)`` 0 for black (Eq. 4)."""
+    """Return S of ``(..., 3)`` uint8 RGB: ``1 - 3 min / (R + G + B)``, 0 for black (Eq. 4)."""
     total = rgb.sum(axis=-1, dtype=np.int64)
     low = rgb.min(axis=-1).astype(np.int64)
     return np.where(total > 0, 1.0 - 3.0 * low / np.maximum(total, 1), 0.0)
@@ -88,8 +88,8 @@ def saturation(rgb: Plane) -> Floats:
 def hue(rgb: Plane) -> Floats:
     """Return H of ``(..., 3)`` uint8 RGB in degrees, 0..360; 0 for greys (Eq. 5).
 
-    The printed equation gives both branches the condition ``B <= G``; the second one is
-    ``360 - theta`` where ``B > G``.
+    The printed equation gives both branches the condition ``B <= G``; the second one,
+    ``360 - theta``, holds for ``B > G``.
     """
     r, g, b = np.moveaxis(rgb.astype(np.float64), -1, 0)
     root = np.sqrt((r - g) ** 2 + (r - b) * (g - b))
@@ -120,25 +120,27 @@ def hsv_to_rgb(h: Floats, s: Floats, v: Floats) -> Plane:
 def ndi(saturation: Floats, value: Floats) -> Floats:
     """Compute the normalised difference index ``(S - V) / (S + V)`` in -1..1 (Eq. 6, section 3.2).
 
-    The printed ``S - V / S - V`` lacks its brackets and a sign. ``S + V`` is 0 for pure black
-    alone, which is -1 like every other grey, so that a rectified image's border is no shadow.
+    The printed ``S - V / S - V`` lacks its brackets and a sign. ``S + V`` is 0 only for pure black,
+    which gets -1 like every other grey, so that the border of a rectified image is no shadow.
     """
     total = saturation + value
     return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)
 
 
-def _ndi_codes() -> Plane:
+def ndi_codes() -> Plane:
+    """Return Eq. 6 by ``R + G + B`` and ``min(R, G, B)``, ``(766, 256)`` uint8.
+
+    S and V, and so NDI, depend on these two alone. The codes are ``rint((NDI + 1) * 127.5)``.
+    """
     total = np.arange(3 * 255 + 1, dtype=np.float64)[:, None]
     least = np.minimum(np.arange(256, dtype=np.float64)[None, :], np.floor(total / 3))
-    # NDI stays the same when S and V grow alike: times 765 (R + G + B) both are whole numbers,
-    # and a code that lies halfway, as (R + G + B, min) = (85, 0) does, is rounded as one.
+    # A common factor of S and V changes no NDI: times 765 (R + G + B) both are integers, and a
+    # code halfway between two others, as for (R + G + B, min) = (85, 0), is rounded as one.
     index = ndi(3 * 255 * (total - 3.0 * least), total**2)
     return np.rint((index + 1.0) * 127.5).astype(np.uint8)
 
 
-NDI_CODES: Final = _ndi_codes()
-"""``(766, 256)`` uint8: Eq. 6 by ``R + G + B`` and ``min(R, G, B)``, on which alone S, V and so NDI
-depend, as the codes ``rint((NDI + 1) * 127.5)``."""
+NDI_CODES: Final = ndi_codes()
 _LEVELS: Final = np.arange(256)
 """j of Eq. 7."""
 
@@ -146,9 +148,9 @@ _LEVELS: Final = np.arange(256)
 def otsu_threshold(histogram: Sums) -> int | None:
     """Return Otsu's threshold of a ``(256,)`` histogram (Eq. 7 as its source means it).
 
-    The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) (1 - w(T)))``, with the weight
-    ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed
-    text defines ``mu(T)`` as the upper class's weight. None with a single occupied code.
+    It is the lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) (1 - w(T)))``, with the weight
+    ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed text
+    defines ``mu(T)`` as the upper class's weight. None if only one code occurs.
     """
     lower, moment = histogram.cumsum(), (histogram * _LEVELS).cumsum()
     total = lower[-1]
@@ -158,8 +160,8 @@ def otsu_threshold(histogram: Sums) -> int | None:
 def printed_threshold(histogram: Sums) -> int | None:
     """Return Eq. 7's threshold with the definitions printed beside it: ``mu(T) = sum_{j>T} p_j``.
 
-    The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))``, where it is defined.
-    None with a single occupied code.
+    It is the lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))`` among those for which
+    that is defined. None if only one code occurs.
     """
     lower, mean = histogram.cumsum(), (histogram * _LEVELS).sum()
     total = lower[-1]
@@ -168,10 +170,10 @@ def printed_threshold(histogram: Sums) -> int | None:
 
 
 def _first_maximum(difference: Sums, weights: Sums) -> int | None:
-    """Return the lowest T of greatest ``difference^2 / weights``, of those with positive weights.
+    """Return the lowest T of greatest ``difference^2 / weights`` among those with positive weights.
 
-    Both criteria of Eq. 7 times the squared number of pixels: whole numbers, so that codes
-    that no pixel has tie exactly with the code below them.
+    Both criteria of Eq. 7 are multiplied by the squared number of pixels: difference and weights
+    are then integers, and a code that no pixel has ties exactly with the code below it.
     """
     if not weights.any():
         return None
@@ -191,7 +193,7 @@ class Components:
     """Connected components of an image, numbered from 1."""
 
     runs: Runs
-    """Their rows' stretches."""
+    """The runs of their rows, see `roadeval.kernels.plain.components`."""
     count: int
     shape: tuple[int, int]
     """Height and width of the image."""
@@ -207,7 +209,7 @@ def connected_components(shadow: Packed, connectivity: int) -> Components:
 
 
 def buffer_ring(shadow: Packed, width: int) -> Packed:
-    """Return the union of all buffer rings (Eq. 10): within ``width`` dilations, and not shadow."""
+    """Return the union of all buffer rings (Eq. 10): ``width`` dilations of the shadow, less it."""
     reached = KERNELS.dilate(shadow.bits, np.full(width + 1, width), shadow.width)
     return Packed(reached & ~shadow.bits, shadow.width)
 
@@ -221,9 +223,9 @@ class Moments(NamedTuple):
 
 
 def moments_of_sums(sums: Sums) -> Moments:
-    """Moments by label from `roadeval.kernels.plain.run_sums`.
+    """Return the moments by label of `roadeval.kernels.plain.run_sums`.
 
-    The variance is taken about the grey level next to the mean, in integers: nothing cancels,
+    The variance is taken about the grey level nearest to the mean, in integers: nothing cancels,
     a constant component has a deviation of exactly 0, and no component is too large.
     """
     # Whole numbers below 2^53, so that their products and differences are exact in float64.
@@ -237,7 +239,7 @@ def moments_of_sums(sums: Sums) -> Moments:
 
 
 def moments_of_values(labels: npt.NDArray[np.integer], values: Floats, count: int) -> Moments:
-    """Moments by label of ``(n, C)`` values, in two passes; below 1e-9 a deviation is 0."""
+    """Return the moments by label of ``(n, C)`` values; a deviation below 1e-9 is 0."""
     pixels = np.bincount(labels, minlength=count)
 
     def mean(quantity: Floats) -> Floats:
@@ -255,11 +257,11 @@ def compensation(
     """Compute the linear map of Eq. 11 for every component, each channel by itself.
 
     Returns source, target and gain of ``target + (I - source) * gain``, ``(count, C)`` each.
-    ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 where sigma is 0),
+    ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 if sigma is 0),
     after which the component has its ring's mean and deviation. ``printed`` gives
-    ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 where the ring's variance is 0),
-    which has the ratio upside down and flattens the region instead. Components without a ring map
-    to themselves.
+    ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 if the ring's variance is 0),
+    and flattens the region, since its ratio is upside down. Components without a ring stay
+    unchanged.
     """
     above, below = ring.deviation, inside.deviation
     if settings.statistic == "printed":
@@ -272,23 +274,23 @@ def compensation(
     return inside.mean, np.where(here, ring.mean, inside.mean), np.where(here, gain, 1.0)
 
 
-def compensate(view: View, found: Components, ring: Packed, settings: ShadowSettings) -> Rgb:
-    """Apply Eq. 11 to every component of the image that is seen.
+def compensate(view: View, components: Components, ring: Packed, settings: ShadowSettings) -> Rgb:
+    """Apply Eq. 11 to every component of a view's image.
 
-    ``ring`` is the union of their buffer rings. Without a component it is the image itself.
+    ``ring`` is the union of their buffer rings. Without a component the image itself is returned.
     """
-    if not found.count:
+    if not components.count:
         return view.image
-    count, width = found.count + 1, settings.ring_width
+    count, width = components.count + 1, settings.ring_width
     if settings.colour_space == "hsi":
-        return _compensate_hsi(view.image, found.labels(), ring, settings)
-    inside = KERNELS.run_sums(view.planes, found.runs, count)
-    around = KERNELS.ring_sums(view.planes, found.runs, ring.bits, count, width)
+        return compensate_hsi(view.image, components.labels(), ring, settings)
+    inside = KERNELS.run_sums(view.planes, components.runs, count)
+    around = KERNELS.ring_sums(view.planes, components.runs, ring.bits, count, width)
     linear = compensation(moments_of_sums(inside), moments_of_sums(around), settings)
-    return KERNELS.transfer(view.image, found.runs, *linear)
+    return KERNELS.transfer(view.image, components.runs, *linear)
 
 
-def _compensate_hsi(image: Rgb, labels: Labels, ring: Packed, settings: ShadowSettings) -> Rgb:
+def compensate_hsi(image: Rgb, labels: Labels, ring: Packed, settings: ShadowSettings) -> Rgb:
     """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
     result, flat = image.reshape(-1, 3).copy(), labels.ravel()
     shadow, count = np.flatnonzero(flat), int(flat.max()) + 1
@@ -299,7 +301,7 @@ def _compensate_hsi(image: Rgb, labels: Labels, ring: Packed, settings: ShadowSe
     moments = moments_of_values(k, values, count), moments_of_values(label, ring_values, count)
     source, target, gain = compensation(*moments, settings)
     s, v = np.clip(target[k] + (values - source[k]) * gain[k], 0.0, 1.0).T
-    # Components that are left as they are come back exactly: the conversion inverts every hsi.
+    # A component that is not compensated stays exactly the same: the conversion inverts any hsi.
     result[shadow] = hsv_to_rgb(hue(colour), s, v)
     return result.reshape(image.shape)
 
@@ -309,18 +311,18 @@ def _saturation_value(rgb: Plane) -> Floats:
 
 
 def lift(view: View, shadow: Packed, settings: ShadowSettings) -> tuple[Rgb, Packed]:
-    """Compensate what a mask calls shadow: components, rings, linear map (Eq. 9-11).
+    """Compensate the shadow of a mask: components, rings, linear map (Eq. 9-11).
 
     Returns the image, and the rings.
     """
-    found = connected_components(shadow, settings.connectivity)
+    components = connected_components(shadow, settings.connectivity)
     ring = buffer_ring(shadow, settings.ring_width)
-    return compensate(view, found, ring, settings), ring
+    return compensate(view, components, ring, settings), ring
 
 
 @per_view
 def bind(settings: ShadowSettings, _learnt: None, view: View) -> Output:
-    """Filter what is seen."""
+    """Filter the image of a view."""
     threshold_of = otsu_threshold if settings.threshold == "otsu" else printed_threshold
     codes, histogram = KERNELS.look_up_sum_min(view.planes, NDI_CODES)
     threshold = threshold_of(histogram)
@@ -342,7 +344,7 @@ def bind(settings: ShadowSettings, _learnt: None, view: View) -> Output:
 
 
 def oracle(settings: ShadowSettings, _learnt: None, view: View, truth: Truth) -> Output:
-    """Filter what is truly shadow; the compensation stays."""
+    """Filter the true shadow with the same compensation."""
     return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
 
 

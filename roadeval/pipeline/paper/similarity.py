@@ -24,8 +24,8 @@ from roadeval.pipeline.stage import (
 
 RIDGE: Final = 1.0
 """Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is
-singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001 a singular
-covariance's inverse is lost in rounding."""
+singular. 1 is about the variance that 8-bit JPEG coding alone adds; with much less than 0.001 the
+inverse of a singular covariance is lost in rounding."""
 SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
 
@@ -34,8 +34,8 @@ class SimilaritySettings:
     """Settings of phase 1."""
 
     quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
-    """A pixel is road where ``d^2`` is at most this quantile of the chi-squared distribution with 3
-    degrees of freedom: the share of normally distributed road colours kept."""
+    """A pixel is road if ``d^2`` is at most this quantile of the chi-squared distribution with 3
+    degrees of freedom: the share of normally distributed road colours that count as road."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,11 @@ class RoadColour:
         check_arrays(self, np.float64, mean=(3,), covariance=(3, 3))
         check_range("mean", self.mean, 0, 255)
         check_range("covariance", self.covariance, -(255**2), 255**2)
-        # One grey alone has no variance; the rest is rounding, and far below the least ridge.
+        # A single grey level has no variance; rounding may make it slightly negative.
         if np.linalg.eigvalsh(self.covariance)[0] < -1e-6:
-            raise ValueError("covariance has an eigenvalue below 0, and so is no covariance")
+            raise ValueError("covariance is not positive semi-definite")
         if not np.allclose(self.covariance, self.covariance.T):
-            raise ValueError("covariance is not symmetric, and so no covariance")
+            raise ValueError("covariance is not symmetric")
 
 
 def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
@@ -74,14 +74,14 @@ def whitening(covariance: Floats) -> Floats:
     """Return W, ``(3, 3)`` lower triangular, of a positive covariance S: ``W^T W = S^-1``.
 
     So the distance of Eq. 2 is ``|W (x - m)|``, which rounding can neither make negative nor blow
-    up: even where S is singular but for the least ridge it is off by less than 0.01 in single
+    up: even if only the ridge keeps S from being singular, its error is below 0.01 in single
     precision.
     """
     return np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
-    """Return phase 1 as a pure function of what it sees (Eq. 2).
+    """Return phase 1 as a pure function of a view (Eq. 2).
 
     ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
     (its brackets are misplaced).

@@ -35,10 +35,10 @@ from roadeval.pipeline.stage import (
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
 Penalty = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
-"""C of a soft margin. It bounds the machine's weights, which are to stay far below `GREATEST`."""
+"""C of a soft margin. It bounds the machine's weights, which must stay far below `GREATEST`."""
 
 _BLOCK: Final = 1 << 17
-"""Kernel values computed at once: 1 MB of float64, of which a few stay in the cache."""
+"""Kernel values computed at once: 1 MB of float64; a few such arrays fit in the cache."""
 
 
 @stage_settings
@@ -47,14 +47,14 @@ class SvmSettings:
 
     kernel: Literal["rbf", "linear"] = "rbf"
     """``rbf``, an adaptation of the printed machine: road is a mid grey between dark verges and
-    bright sky, which no plane in RGB cuts out; or ``linear``, as printed (Eq. 12)."""
+    bright sky, which no plane in RGB separates; or ``linear``, as printed (Eq. 12)."""
     c: Penalty = 1.0
     """Penalty of a training pixel on the wrong side. The printed Eq. 13 allows none, which has no
     solution for classes that overlap."""
     gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
     """Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours."""
     threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    """A pixel is road where the decision function is above this."""
+    """A pixel is road if the decision function is above this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,6 @@ def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     mean, scale = colours.mean(axis=0), colours.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     features = (colours - mean) / scale
-    # Only here: the import takes a second, and a model from a file does not need it.
     from sklearn.svm import SVC
 
     machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
@@ -113,8 +112,8 @@ def decision(colours: Plane, machine: SupportVectors, settings: SvmSettings) -> 
     for start in range(0, len(features), rows):
         block = slice(start, start + rows)
         pairs = zip(features[block].T, machine.vectors.T, strict=True)
-        squared = sum((own[:, None] - vector) ** 2 for own, vector in pairs)
-        # Row by row: a matrix product would round a row depending on the other rows.
+        squared = sum((feature[:, None] - vector) ** 2 for feature, vector in pairs)
+        # Row by row: the rounding of a matrix product's row depends on the other rows.
         terms = np.exp(-settings.gamma * squared) * machine.weights
         result[block] = terms.sum(axis=1) + machine.offset
     return result
@@ -124,20 +123,20 @@ def decision(colours: Plane, machine: SupportVectors, settings: SvmSettings) -> 
 def colour_table(machine: SupportVectors, settings: SvmSettings) -> Words:
     """Return the decision of Eq. 16 for every colour there is.
 
-    A pixel's features are its three channels alone, so this is the whole machine. The last four
-    tables are kept, each 2 MiB, or 4 where many colours are undecided.
+    A pixel's features are its three channels alone, so that the table replaces the machine. The
+    last four tables stay in memory, each 2 MiB, or 4 if many colours are undecided.
     """
     # Matrices this small gain nothing from threads, which only compete with other work.
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):
         return table_of(
-            _margins(machine, settings),
+            colour_margins(machine, settings),
             lambda colours: decision(colours, machine, settings) > settings.threshold,
         )
 
 
-def _margins(machine: SupportVectors, settings: SvmSettings) -> Margins:
+def colour_margins(machine: SupportVectors, settings: SvmSettings) -> Margins:
     """Return the decision values on the colour cube, less the threshold."""
     offset = machine.offset - settings.threshold
 
@@ -152,7 +151,7 @@ def _margins(machine: SupportVectors, settings: SvmSettings) -> Margins:
     if settings.kernel == "linear":
         plane = machine.weights @ machine.vectors
         return sums_of_terms(plane[:, None] * every, offset)
-    # A feature is off by a few roundings of the largest, and exp(-gamma x^2) is nowhere steeper
+    # A feature's error is a few roundings of the largest, and exp(-gamma x^2) is nowhere steeper
     # than sqrt(gamma).
     reach = float(max(np.abs(every).max(), np.abs(machine.vectors).max()))
     rounding = 8 * EPS * (1 + settings.gamma**0.5 * reach)
@@ -160,7 +159,7 @@ def _margins(machine: SupportVectors, settings: SvmSettings) -> Margins:
 
 
 def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Output]:
-    """Return phase 3 as a pure function of what it sees."""
+    """Return phase 3 as a pure function of a view."""
     table = colour_table(machine, settings)
 
     def run(view: View) -> Output:

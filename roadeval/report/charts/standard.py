@@ -16,7 +16,7 @@ from roadeval.evaluation.metrics import METRICS, SHORT, TESTED
 from roadeval.evaluation.score.thresholds import LEVELS, Thresholds
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import MASK, finals, grouped, merged, only, values_of
+from roadeval.evaluation.tables import MASK, finals, group_rows, merge_names, only, values_of
 from roadeval.report.blocks import Figure
 from roadeval.report.captions import caption
 from roadeval.report.chart import (
@@ -31,12 +31,12 @@ from roadeval.report.chart import (
     looks,
     thin,
 )
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import collect
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.evaluation.comparison.compare import Change
+    from roadeval.evaluation.comparison.compare import MaskChange
     from roadeval.results.facts import Totals
 
 
@@ -62,7 +62,7 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
         OverDrive(caption("figure 3a"), lambda windows: over_windows(windows, [TESTED])),
         OverDrive(caption("figure 3b"), lambda windows: over_windows(windows, ["FPR", "FNR"])),
         OverDrive(caption("further rates"), further_rates),
-        *found_in(charts, "FIGURE"),
+        *collect(charts, "FIGURE"),
     )
 
 
@@ -104,7 +104,7 @@ def over_frames(
 
 def stages(totals: Totals) -> list[Chart]:
     """Return a chart of each rate with a line for each variant: the masks of its stages."""
-    names = merged(stages for variant, stages in totals.items() if variant != BASELINE)
+    names = merge_names(stages for variant, stages in totals.items() if variant != BASELINE)
 
     def line(variant: str, look: Look, rate: str) -> Series:
         rates = {stage: in_percent(total.get(rate)) for stage, total in totals[variant].items()}
@@ -216,7 +216,7 @@ def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference
     )
 
 
-def changes(finals: Sequence[Change]) -> list[Chart]:
+def changes(finals: Sequence[MaskChange]) -> list[Chart]:
     """Return each result's change against the base, with a chart for each rate."""
     return [
         Chart(
@@ -300,7 +300,7 @@ def reliability(levels: pd.DataFrame, totals: Totals) -> Chart:
     """
     by_variant = looks([*totals])
     lines = [series("as it says", Look(FAINT, "dotted"), [0, 100], [0, 100])]
-    for (name, _), rows in grouped(levels, MASK):
+    for (name, _), rows in group_rows(levels, MASK):
         pixels = rows["other"] + rows["road"]
         stated = rows["level"] / (LEVELS - 1) * pixels
         sums = rows.assign(pixels=pixels, stated=stated).groupby(rows["level"] * BINS // LEVELS)
@@ -318,7 +318,7 @@ def precision_over_recall(levels: pd.DataFrame, totals: Totals) -> Chart:
     the masks lie.
     """
     by_variant, curves = looks([*totals]), []
-    for (name, _), rows in grouped(levels, MASK):
+    for (name, _), rows in group_rows(levels, MASK):
         curve = Thresholds.of(rows[["other", "road"]].to_numpy().T)
         if curve.road:
             recall, precision = 100 * curve.recall, 100 * curve.precision

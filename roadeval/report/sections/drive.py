@@ -15,7 +15,7 @@ from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import merged, only, perfect_stages
+from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
@@ -166,7 +166,7 @@ def stages(findings: Findings) -> Iterator[Block]:
     """Yield the change of the mask by each stage, and each stage's part of the error."""
     yield Heading("Which stage broke it")
     yield Figure(charts.stages(findings.totals), caption("stages", baseline=BASELINE))
-    columns = merged(findings.error_parts.values())
+    columns = merge_names(findings.error_parts.values())
     yield Table(
         ["final mask", *columns, TESTED],
         [

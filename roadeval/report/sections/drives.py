@@ -20,6 +20,7 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, is_significant, marked_interval
+from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import elided
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ _SHOWN: Final = (TESTED, "FPR", "FNR")
 
 def plots(findings: FleetFolder) -> Iterator[Block]:
     """Yield the effects of the filter and of the best variant on each drive; the worst drives."""
-    if findings.first_scores.empty:
+    if findings.focus_scores.empty:
         return
     yield Heading("Drive by drive")
     for place, (effect, title) in enumerate(main_effects(findings)):
@@ -65,13 +66,13 @@ def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
 
 
 def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
-    """Return the differences of each drive, by base: of the first variant that has any."""
+    """Return the differences of each drive by base: of the focus, if it has any, or of another."""
     differences = {}
     for base in BASES:
         rows = only(findings.effects, base=base)
         if variants := values_of(rows, "variant"):
-            first = next(iter(findings.finals))
-            rows = only(rows, variant=first if first in variants else variants[0])
+            focus = focus_of(findings.finals)
+            rows = only(rows, variant=focus if focus in variants else variants[0])
             differences[base] = rows.set_index("drive")["mean"]
     return differences
 
@@ -80,7 +81,7 @@ def table(findings: FleetFolder) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
     yield replace(drives_table(findings), find="Find drives, tags, states:")
-    yield note("sorted drives")
+    yield note("sorted drives", variant=focus_of(findings.finals))
 
 
 def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
@@ -88,7 +89,7 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
 
     A table of so many ``worst`` drives, with the highest ERR, has no state and no group.
     """
-    scores, rows = findings.first_scores, findings.drives
+    scores, rows = findings.focus_scores, findings.drives
     lines = {
         drive.drive: ", ".join(f"{key}: {value}" for key, value in drive.tags.items())
         for drive in findings.facts.drives
@@ -222,7 +223,8 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     rows = records(findings.worst[:most])
     if not rows:
         return
-    yield Heading("The worst frames over all drives")
+    focus = focus_of(findings.finals)
+    yield Heading(f"The worst frames of {focus} over all drives")
     pictures = []
     for row in rows:
         title = f"{elided(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
@@ -233,7 +235,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
         yield ImageGrid(pictures[:SEEN], across)
     if more := pictures[SEEN:]:
         yield Details(f"{len(more)} more", [ImageGrid(more, across)])
-    legend = caption("worst frames of drives", errors=caption("errors"))
+    legend = caption("worst frames of drives", variant=focus, errors=caption("errors"))
     if lacking := len(rows) - len(pictures):
         legend += f" {caption('missing pictures', pictures=counted(lacking, 'picture'))}"
     yield Text(legend, "note")

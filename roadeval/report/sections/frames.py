@@ -29,6 +29,7 @@ from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.tables import variant_cell
 from roadeval.results.sentences import step_by_step, without_filter
+from roadeval.results.verdict import focus_of
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -40,21 +41,21 @@ MOST: Final = 6
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, and the frames that the filter changed most."""
-    first = next(iter(findings.finals), None)
-    if first is None:
+    focus = focus_of(findings.finals)
+    if focus is None:
         if (doubt := findings.facts.unlabelled) and doubt.sign:
             meaning = SIGNS[doubt.sign]
             rule = note("frames in doubt", sign=doubt.sign, variant=doubt.variant, meaning=meaning)
             yield from _frames(findings, [Heading("Frames to look at"), rule], findings.worst)
         return
     if not findings.worst:
-        yield Heading("The worst frames")
-        yield Text(caption("no worst frame", variant=first))
-    rules = [caption("worst frames", variant=first)]
+        yield Heading(f"The worst frames of {focus}")
+        yield Text(caption("no worst frame", variant=focus))
+    rules = [caption("worst frames", variant=focus)]
     rows = (row for frame in findings.worst for row in frame.layers if row)
     if variants := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
         rules.append(caption("stages of worst frames", variants=listing(variants)))
-    head = [Heading("The worst frames"), Text(" ".join(rules), "note")]
+    head = [Heading(f"The worst frames of {focus}"), Text(" ".join(rules), "note")]
     if not findings.inspect:
         head.append(note("no command"))
     yield from _frames(findings, head, findings.worst)

@@ -7,12 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from scipy.fft import dct
+from scipy.linalg import toeplitz
 from statsmodels.stats.multitest import multipletests
 
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats.autocorrelation import mean_distribution
+from roadeval.evaluation.stats.autocorrelation import cosine_variances, mean_distribution
 from roadeval.evaluation.stats.difference import (
-    CameraRates,
     Difference,
     benjamini_hochberg,
     holm,
@@ -32,9 +33,10 @@ INDEPENDENT = np.random.default_rng(3).normal(0.01, 0.02, 200)
 # --- Within a drive
 
 
-def within(rates, base, settings=SETTINGS, **options) -> Difference:
+def within(rates, base, settings=SETTINGS, rate="ERR") -> Difference:
     """The difference of a drive of one camera."""
-    return within_drive([CameraRates(np.arange(len(rates)), rates, base)], settings, **options)
+    columns = {rate: rates, f"{rate}_base": base, "stamp_ns": np.arange(len(rates))}
+    return within_drive(pd.DataFrame({**columns, "camera": "front"}), rate, settings)
 
 
 def from_30_percent(differences: np.ndarray, settings=SETTINGS) -> Difference:
@@ -47,7 +49,7 @@ def test_frames_are_counted_as_worse_and_better_by_the_rate_s_direction():
     rates = base + np.array([0.1] * 7 + [-0.1] * 3 + [0.0, math.nan])
     lower = within(rates, base)
     assert (lower.worse, lower.better, lower.equal, lower.units) == (7, 3, 1, 11)
-    higher = within(rates, base, higher_is_better=True)
+    higher = within(rates, base, rate="ACC")
     assert (higher.worse, higher.better, higher.equal) == (3, 7, 1)
 
 
@@ -159,7 +161,7 @@ def test_drives_are_counted_by_the_direction_in_which_they_changed():
     means = drives([0.1, 0.2, 0.3, -0.1, 0.0, 0.0])
     lower = over_drives(means, 0.95)
     assert (lower.worse, lower.better, lower.equal) == (3, 1, 2)
-    higher = over_drives(means, 0.95, higher_is_better=True)
+    higher = over_drives(means, 0.95, "ACC")
     assert (higher.worse, higher.better, higher.equal) == (1, 3, 2)
 
 
@@ -312,3 +314,92 @@ def test_of_drives_that_seem_to_differ_about_as_few_as_are_allowed_do_not():
         significant = np.array(benjamini_hochberg(p)) <= 0.1
         false.append(significant[:20].sum() / max(significant.sum(), 1))
     assert np.mean(false) == pytest.approx(0.05, abs=0.015)
+
+
+STANDARD = np.random.default_rng(1).standard_normal(400)
+BURSTS = np.maximum(STANDARD - 1, 0)
+
+
+def width(series: np.ndarray) -> float:
+    low, high = mean_distribution(series).interval(0.95)
+    return high - low
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.95, 0.999])
+@pytest.mark.parametrize("n", [12, 61])
+def test_variances_of_cosine_coefficients_and_of_the_mean_are_exact(rho: float, n: int) -> None:
+    cosines = dct(np.eye(n), axis=0, norm="ortho")
+    exact = np.diag(cosines @ toeplitz(rho ** np.arange(n)) @ cosines.T)
+    assert cosine_variances(np.array([rho]), n, n)[0] == pytest.approx(exact, rel=1e-9)
+
+
+def test_independent_frames_are_worth_about_as_many_and_give_students_interval() -> None:
+    mean = mean_distribution(STANDARD)
+    low, high = stats.t.interval(0.95, 399, STANDARD.mean(), stats.sem(STANDARD))
+    assert 250 < mean.effective <= 400
+    assert mean.interval(0.95) == pytest.approx((low, high), abs=0.15 * (high - low))
+
+
+def test_values_that_are_independent_by_design_have_students_interval_and_p_value() -> None:
+    mean, student = mean_distribution(STANDARD, independent=True), stats.ttest_1samp
+    expected = student(STANDARD, 0.1)
+    assert mean.interval(0.9) == pytest.approx(tuple(expected.confidence_interval(0.9)))
+    assert mean.p_value(0.1) == pytest.approx(expected.pvalue)
+
+
+@pytest.mark.parametrize("rho", [0.5, 0.9])
+def test_a_first_order_autoregression_is_worth_its_known_number_of_frames(rho: float) -> None:
+    series = autoregression(np.random.default_rng(2), 20_000, rho)
+    worth = 20_000 * (1 - rho) / (1 + rho)
+    assert mean_distribution(series).effective == pytest.approx(worth, rel=0.3)
+
+
+def test_frames_that_repeat_their_neighbour_tell_no_more_than_once() -> None:
+    assert width(np.repeat(STANDARD, 5)) == pytest.approx(width(STANDARD), rel=0.2)
+
+
+def test_a_slow_drift_below_noise_widens_the_interval() -> None:
+    rng = np.random.default_rng(3)
+    slow = autoregression(rng, 600, 0.98) + rng.standard_normal(600)
+    assert width(slow) > 2 * width(rng.permutation(slow))
+
+
+@pytest.mark.parametrize("series", [STANDARD, BURSTS, STANDARD.cumsum()])
+@pytest.mark.parametrize("confidence", [0.8, 0.95, 0.999])
+def test_the_ends_of_an_interval_are_the_means_that_the_p_value_just_allows(
+    series: np.ndarray, confidence: float
+) -> None:
+    mean = mean_distribution(series)
+    for end in mean.interval(confidence):
+        assert mean.p_value(end) == pytest.approx(1 - confidence, rel=1e-6)
+    assert mean.p_value(mean.mean) > 0.9
+
+
+def test_an_interval_is_the_standard_error_times_students_quantile_but_for_skewness() -> None:
+    mean = mean_distribution(autoregression(np.random.default_rng(4), 91, 0.8))
+    half = stats.t.ppf(0.975, mean.degrees) * mean.standard_error
+    expected = (mean.mean - half, mean.mean + half)
+    assert mean._replace(skewness=0.0).interval(0.95) == pytest.approx(expected)
+    assert mean.interval(0.95) == pytest.approx(expected, abs=0.1 * half)
+
+
+def test_a_difference_beyond_doubt_has_a_p_value_that_says_so() -> None:
+    rng = np.random.default_rng(5)
+    p = [mean_distribution(1 + rng.standard_normal(60)).p_value() for _ in range(60)]
+    assert np.mean(np.array(p) < 0.05 / 20) > 0.8
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
+def test_small_p_values_are_as_rare_as_they_say_where_nothing_differs(rho: float) -> None:
+    rng = np.random.default_rng(6)
+    p = np.array([mean_distribution(autoregression(rng, 91, rho)).p_value() for _ in range(500)])
+    assert (p < 0.05).mean() < 0.07
+    assert (p < 0.01).mean() < 0.02
+    assert (p < 0.0025).sum() <= 5
+
+
+def test_bursts_lengthen_the_interval_on_their_side() -> None:
+    mean = mean_distribution(BURSTS)
+    low, high = mean.interval(0.95)
+    assert high - mean.mean > 1.2 * (mean.mean - low)
+    assert mean_distribution(-BURSTS).interval(0.95) == pytest.approx((-high, -low))

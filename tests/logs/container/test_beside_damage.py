@@ -1,13 +1,22 @@
 """Chunks that are intact are read, whatever is damaged beside them, and nothing unverified is."""
 
+import zlib
 from collections.abc import Callable
 from pathlib import Path
+from time import process_time
 
 import pytest
+import zstandard
 from mcap.opcode import Opcode
+from mcap.writer import CompressionType, Writer
 
+from roadeval.logs.errors import LogError
+from roadeval.logs.log import open_log
+from tests.fixtures import broken
 from tests.fixtures.broken import HEAD, data_end, length_of, mended, over, records
+from tests.fixtures.shared import shared
 from tests.fuzz.intact import FRAMES, Intact, Reading, intact_logs, read
+from tests.logs.making import chunk_record
 
 START, SIZE, DATA_SIZE, NAME = 9, 25, 41, 37
 """Where a chunk's head has its start time, the size of its records, and, behind a name of no
@@ -142,3 +151,98 @@ def test_an_unchunked_log_whose_data_hides_its_topics_is_read_by_the_summarys_re
     reading, other = beside(intact_logs()["unchunked"], tmp_path, damage)
     assert not other
     assert "512 bytes too many" in " ".join(reading.told)
+
+
+def logged(path: Path, messages: int, first: int = 0) -> bytes:
+    """A log of JSON messages on one topic, some four in a chunk."""
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=2_000, compression=CompressionType.NONE)
+        writer.start()
+        channel = writer.register_channel("/a", "json", 0)
+        for number in range(first, first + messages):
+            data = b'{"n":%d,"fill":"%s"}' % (number, b"x" * 480)
+            writer.add_message(channel, 1_000 * number, data, 1_000 * number)
+        writer.finish()
+    return path.read_bytes()
+
+
+def told_of(tmp_path: Path, data: bytes) -> tuple[int, list[str]]:
+    """The number of messages that a log gives, and what is said about it."""
+    path = tmp_path / "read.mcap"
+    path.write_bytes(data)
+    with open_log(path) as log:
+        log.verify()
+        return log.topics[0].count, [str(damage) for damage in log.damage]
+
+
+@pytest.mark.parametrize("logs", [1, 2, 3])
+def test_logs_joined_end_to_end_are_read_one_after_the_other(tmp_path, logs):
+    parts = [logged(tmp_path / f"{n}.mcap", 12, first=12 * n) for n in range(logs)]
+    count, told = told_of(tmp_path, b"".join(parts))
+    assert count == 12 * logs
+    assert sum("another log begins here" in damage for damage in told) == logs - 1
+    assert "are missing" not in " ".join(told)
+
+
+def test_a_chunk_that_lies_in_a_message_is_no_chunk_of_the_log(tmp_path):
+    inner = logged(tmp_path / "inner.mcap", 8)
+    with (tmp_path / "outer.mcap").open("wb") as file:
+        writer = Writer(file, compression=CompressionType.NONE, use_chunking=False)
+        writer.start()
+        channel = writer.register_channel("/a", "json", 0)
+        writer.add_message(channel, 0, inner, 0)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    count, _ = told_of(tmp_path, (tmp_path / "outer.mcap").read_bytes())
+    assert count == 2
+
+
+def test_a_log_that_is_a_link_to_itself_is_one_line(tmp_path):
+    path = tmp_path / "loop.mcap"
+    path.symlink_to(path)
+    with pytest.raises(LogError) as caught:
+        open_log(path)
+    assert "\n" not in str(caught.value)
+
+
+def millions_of_empty_records() -> bytes:
+    records = (b"\x80" + bytes(8)) * 8_000_000
+    return chunk_record(zstandard.compress(records), "zstd", len(records), zlib.crc32(records))
+
+
+def chunks_of_a_wrong_size_that_unpack_to_gigabytes() -> bytes:
+    return 50 * chunk_record(zstandard.compress(bytes(256 << 20)), "zstd", 1_000, 12_345)
+
+
+@pytest.mark.parametrize(
+    ("bomb", "seconds"),
+    [(millions_of_empty_records, 10), (chunks_of_a_wrong_size_that_unpack_to_gigabytes, 5)],
+)
+def test_bombs_take_seconds(tmp_path, bomb, seconds):
+    data, chunks = logged(tmp_path / "whole.mcap", 4), bomb()
+    at = broken.chunk(0, data)
+    began = process_time()
+    count, told = told_of(tmp_path, data[:at] + chunks + data[at:])
+    assert process_time() - began < seconds
+    assert count == 4
+    assert told
+
+
+@pytest.mark.parametrize("folder", shared("failures"))
+@pytest.mark.parametrize(
+    ("name", "frames", "said"),
+    [
+        ("hole_in_chunk_0", 15, "lost: 4 of /camera/image"),
+        ("schema_byte_changed", 6, "that is believed; messages fit it better"),
+        ("schema_byte_intact", 6, ""),
+    ],
+)
+def test_each_known_failure_is_read_and_said(folder, name, frames, said):
+    began = process_time()
+    with open_log(folder / f"{name}.mcap") as log:
+        log.verify()
+        assert {topic.count for topic in log.topics} == {frames}
+        told = " ".join(map(str, log.damage))
+    assert said in told
+    assert bool(said) == bool(told)
+    assert process_time() - began < 10

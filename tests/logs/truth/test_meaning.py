@@ -16,8 +16,8 @@ from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import LabelSettings, MaskSettings
 from roadeval.logs.truth.beside import file_label
-from roadeval.logs.truth.labels import meaning_of, seen_in, understand
-from roadeval.logs.truth.names import LabelSet, with_keys
+from roadeval.logs.truth.labels import count_values, meaning_of, understand
+from roadeval.logs.truth.names import LabelSet, find_keys
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()
@@ -119,7 +119,7 @@ ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
 def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
     labels = LabelSettings(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
-    table = understand(labels, [seen_in(picture, labels, "/labels", LIMITS)], "/labels")
+    table = understand(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
 
@@ -128,14 +128,14 @@ def test_colours_are_asked_for_with_those_seen() -> None:
     with pytest.raises(
         LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*`labels.road_colors`"
     ):
-        seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels", LIMITS)
+        count_values(colors([ROAD, SKY]), LabelSettings(), "/labels", LIMITS)
 
 
 def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
     assert to_labels(picture, LIMITS).tolist() == [[0, 1, 2]]
     labels = LabelSettings(road_colors=(ROAD,))
-    table = understand(labels, [seen_in(picture, labels, "/labels", LIMITS)], "/labels")
+    table = understand(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[0, 1, 0]]
 
 
@@ -143,7 +143,7 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
 def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelSettings) -> None:
     picture = CompressedPicture(0, "jpeg", jpeg(grey(255)))
     with pytest.raises(LogError, match=r"/labels is JPEG, .*: log labels as PNG"):
-        seen_in(picture, labels, "/labels", LIMITS)
+        count_values(picture, labels, "/labels", LIMITS)
     with pytest.raises(BadMessage, match="a JPEG, whose compression changes label values"):
         understand(labels, [[0, 255]], "/labels").read(picture, LIMITS)
 
@@ -156,7 +156,7 @@ def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(tm
     (folder / "7.jpg").write_bytes(jpeg(np.dstack([mask] * 3)))
     picture = CompressedPicture(0, "jpeg", (folder / "7.jpg").read_bytes())
     with pytest.raises(LogError, match="blurs their edges; make a new folder: ") as caught:
-        seen_in(picture, LabelSettings(), str(folder.parent), LIMITS, folder / "7.jpg")
+        count_values(picture, LabelSettings(), str(folder.parent), LIMITS, folder / "7.jpg")
     command = str(caught.value).partition("folder: ")[2].replace("python", sys.executable, 1)
     subprocess.run(["bash", "-c", command], check=True, cwd=tmp_path)
     mended = CompressedPicture(0, "png", (tmp_path / "png" / "7.png").read_bytes())
@@ -170,7 +170,7 @@ def test_classes_saved_as_jpeg_are_no_masks_to_mend(tmp_path, colours):
     pixels[20:] = colours
     picture = CompressedPicture(0, "jpeg", jpeg(pixels))
     with pytest.raises(LogError) as caught:
-        seen_in(picture, LabelSettings(), str(tmp_path), LIMITS, tmp_path / "7.jpg")
+        count_values(picture, LabelSettings(), str(tmp_path), LIMITS, tmp_path / "7.jpg")
     assert "make a new folder" not in str(caught.value)
 
 
@@ -184,7 +184,7 @@ def test_road_that_covers_hardly_any_pixel_is_told_with_the_classes(tmp_path, ro
         classes = {"fence": 7, "road": 3}
         origin = replace(origin, classes=classes, occurring={"fence": 1, "road": 1})
     place = MaskSettings(str(tmp_path), labels=LabelSettings(road=road))
-    (note,) = meaning_of(with_keys(origin, str(tmp_path), place, LIMITS), place).notes
+    (note,) = meaning_of(find_keys(origin, str(tmp_path), place, LIMITS), place).notes
     names = "3 (99.5 %), 7 (0.5 %)" if road == (7,) else "road (99.5 %), fence (0.5 %)"
     assert note.startswith("road is 0.50 % of the labelled pixels that were looked at, which are")
     assert f"{names}: does `labels.road` name the road?" in note

@@ -1,5 +1,8 @@
 """Folders of images and videos become logs."""
 
+import errno
+import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,13 +10,26 @@ import cv2
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 
-from roadeval.data import Frame
+from roadeval.data import (
+    ERRORS,
+    Counts,
+    Frame,
+    FrameResult,
+    Layer,
+    Output,
+    Packed,
+    Role,
+    StageResult,
+    Tally,
+    VariantResult,
+)
 from roadeval.logs.errors import LogError
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LabelSettings, LogConfig
-from roadeval.logs.writing.writer import pack
+from roadeval.logs.writing.writer import LogWriter, SidecarWriter, pack
 from tests.fixtures.shared import shared
 from tests.logs.making import grey, jpeg, png
 
@@ -185,3 +201,113 @@ def test_labels_of_an_annotation_tool_are_said_to_be_for_a_replay(labels, tmp_pa
     asked = f"roadeval replay LOG.mcap --truth {tmp_path / labels} --truth-images {images}"
     assert str(caught.value).endswith(asked)
     assert not (tmp_path / "log.mcap").exists()
+
+
+def written(path: Path) -> Path:
+    with LogWriter(path) as log:
+        for stamp in (10, 20):
+            log.image("/camera", stamp, jpeg(grey(stamp)), "jpeg", log_time_ns=stamp + 1)
+            log.mask("/truth/road", stamp, grey(255))
+    return path
+
+
+def test_foxgloves_own_decoder_reads_it(tmp_path: Path) -> None:
+    with written(tmp_path / "a.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = [
+            (schema.name, channel.topic, decoded.timestamp.ToNanoseconds(), decoded.format)
+            for schema, channel, _, decoded in reader.iter_decoded_messages()
+        ]
+    name = "foxglove.CompressedImage"
+    assert sorted(found) == [
+        (name, "/camera", 10, "jpeg"),
+        (name, "/camera", 20, "jpeg"),
+        (name, "/truth/road", 10, "png"),
+        (name, "/truth/road", 20, "png"),
+    ]
+
+
+def test_nothing_is_left_of_a_log_that_cannot_be_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_writer: Writer) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Writer, "finish", full)
+    path = tmp_path / "a.mcap"
+    with pytest.raises(LogError, match="cannot be written: No space left"):
+        written(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+MASK = np.array([[0, 1]], np.uint8)
+RATES = {"ERR": 0.5, "TNR": math.nan}
+STAMP, LOGGED = 1_700_000_000_000_000_005, 1_700_000_000_007_000_000
+
+
+def result() -> FrameResult:
+    frame = Frame(3, STAMP, LOGGED, np.zeros((1, 2, 3), np.uint8), b"")
+    stage = StageResult("post", Output(mask=Packed.of(MASK)), 0.0)
+    return FrameResult(
+        frame,
+        Role.EVALUATED,
+        (VariantResult("filtered", (stage,)),),
+        errors={"filtered": Layer(ERRORS, np.array([[2, 1]], np.uint8))},
+        tallies=(Tally("filtered", "post", Counts(tp=1, fp=1), rates=RATES),),
+    )
+
+
+def write(path: Path, frame_id: str = "cam_front", camera: str = "") -> Path:
+    with SidecarWriter(path) as sidecar:
+        sidecar.write(result(), frame_id, camera)
+    return path
+
+
+def image(data: bytes) -> list[list[list[int]]]:
+    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels.ndim == 3:
+        pixels = cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGBA)
+    found: list[list[list[int]]] = pixels.tolist()
+    return found
+
+
+@pytest.mark.parametrize(("source", "kept"), [("cam_front", "cam_front"), ("", "camera")])
+def test_masks_are_in_the_frame_of_the_camera(tmp_path: Path, source: str, kept: str) -> None:
+    with write(tmp_path / "results.mcap", source, "/front").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = {
+            channel.topic: message.frame_id
+            for _, channel, _, message in reader.iter_decoded_messages(
+                ["/roadeval/front/filtered/post", "/roadeval/front/filtered/errors"]
+            )
+        }
+    assert found == {f"/roadeval/front/filtered/{name}": kept for name in ("post", "errors")}
+
+
+def test_masks_and_errors_bear_the_images_own_times(tmp_path: Path) -> None:
+    with write(tmp_path / "results.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = ["/roadeval/filtered/post", "/roadeval/filtered/errors"]
+        found = {
+            channel.topic: (message.log_time, decoded.timestamp.ToNanoseconds(), decoded.data)
+            for _, channel, message, decoded in reader.iter_decoded_messages(topics)
+        }
+    assert {times[:2] for times in found.values()} == {(LOGGED, STAMP)}
+    assert image(found[topics[0]][2]) == [[0, 255]]
+    assert image(found[topics[1]][2]) == [[[213, 94, 0, 220], [0, 158, 115, 160]]]
+
+
+def test_metrics_are_json_with_a_schema_and_undefined_rates_are_null(tmp_path: Path) -> None:
+    with write(tmp_path / "results.mcap").open("rb") as file:
+        messages = make_reader(file).iter_messages(["/roadeval/metrics/filtered/post"])
+        ((schema, channel, message),) = messages
+    assert schema is not None
+    assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+    fields = json.loads(message.data)
+    properties = json.loads(schema.data)["properties"]
+    assert set(properties) == set(fields)
+    # Foxglove takes what has this title for a time.
+    assert properties["timestamp"]["title"] == "time"
+    assert fields["timestamp"] == {"sec": STAMP // 10**9, "nsec": 5}
+    assert (fields["TP"], fields["FP"], fields["N"]) == (1, 1, 2)
+    assert (fields["ERR"], fields["TNR"]) == (0.5, None)

@@ -8,9 +8,20 @@ from skimage.graph import MCP_Geometric
 from skimage.measure import block_reduce
 from skimage.transform import downscale_local_mean
 
+from roadeval.pipeline.beyond import exposure
 from roadeval.pipeline.beyond.features import GROUPS, beyond, features, names_of, outwards
-from roadeval.pipeline.reference_patch import ReferencePatch
-from roadeval.pipeline.scene import from_patch, reach, scene_of, steepness, tones_of
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
+from roadeval.pipeline.scene import (
+    LEVEL,
+    expose,
+    from_patch,
+    gains,
+    reach,
+    scene_of,
+    steepness,
+    tones_of,
+)
+from roadeval.pipeline.stage import View
 
 PATCH = ReferencePatch()
 ALL = tuple(GROUPS)
@@ -34,8 +45,8 @@ def planes(group, scene):
     return [*GROUPS[group](scene).values()]
 
 
-def close(found, expected, tolerance=1e-4):
-    np.testing.assert_allclose(found, expected, rtol=tolerance, atol=tolerance)
+def close(values, expected, tolerance=1e-4):
+    np.testing.assert_allclose(values, expected, rtol=tolerance, atol=tolerance)
 
 
 def slopes(plane):
@@ -60,10 +71,10 @@ def test_the_working_image_is_the_mean_of_four_pixels_of_the_fine_one(scene):
 
 def test_tones_are_logarithms_and_their_differences(scene):
     red, green, blue = np.moveaxis(np.log(scene.image + 8.0), 2, 0)
-    for found, expected in zip(
+    for values, expected in zip(
         scene.tones, ((red + green + blue) / 3, red - green, blue - green), strict=True
     ):
-        close(found, expected)
+        close(values, expected)
 
 
 def test_distance_to_the_patch_is_in_its_own_deviations_from_its_medians():
@@ -81,11 +92,11 @@ def test_distance_to_the_patch_is_in_its_own_deviations_from_its_medians():
 
 def test_every_group_gives_the_features_that_it_names(scene):
     for name, group in GROUPS.items():
-        assert names_of((name,)) == tuple(f"{name}.{each}" for each in group(scene))
-    found = features(scene, ALL)
-    assert found.shape == (len(names_of(ALL)), HEIGHT, WIDTH)
-    assert np.isfinite(found).all()
-    assert len(set(names_of(ALL))) == len(found)
+        assert names_of((name,)) == tuple(f"{name}.{feature}" for feature in group(scene))
+    values = features(scene, ALL)
+    assert values.shape == (len(names_of(ALL)), HEIGHT, WIDTH)
+    assert np.isfinite(values).all()
+    assert len(set(names_of(ALL))) == len(values)
 
 
 def test_an_image_of_one_colour_has_no_feature_that_is_not_finite():
@@ -98,19 +109,19 @@ def test_colour_is_projected_relative_to_the_patch(scene):
     *channels, _, red, blue = planes("colour", scene)[:6]
     np.testing.assert_array_equal(np.stack(channels, axis=2), scene.image)
     inside = scene.patch > 0
-    for angle, found in zip((30, 45, 60), planes("colour", scene)[6:9], strict=True):
+    for angle, values in zip((30, 45, 60), planes("colour", scene)[6:9], strict=True):
         way = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        own = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
-        close(found, way[0] * red + way[1] * blue - own)
+        light = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
+        close(values, way[0] * red + way[1] * blue - light)
 
 
 def test_light_is_held_against_the_lower_half_and_the_row(scene):
-    own = scene.tones[0].astype(float)
+    light = scene.tones[0].astype(float)
     half, bright, row, far = planes("light", scene)
-    lower = np.sort(own[HEIGHT // 2 :].ravel())
-    close(own - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
-    assert np.mean(own[HEIGHT // 2 :] < (own - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
-    close(row[5], own[5] - np.mean(own[5]))
+    lower = np.sort(light[HEIGHT // 2 :].ravel())
+    close(light - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
+    assert np.mean(light[HEIGHT // 2 :] < (light - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
+    close(row[5], light[5] - np.mean(light[5]))
     close(far[5], np.median(scene.colour[5]))
 
 
@@ -122,26 +133,26 @@ def test_place_is_the_pixels_centre(scene):
 
 
 def test_texture_is_the_root_of_the_mean_slope(scene):
-    found = planes("texture", scene)
+    values = planes("texture", scene)
     for place_, (side, way) in enumerate((side, way) for side in (3, 9, 21) for way in (0, 1)):
         mean = averaged(np.abs(slopes(scene.tones[0])[way]), side)
-        close(found[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
+        close(values[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
     deviation = ndimage.generic_filter(scene.tones[0].astype(float), np.std, 9)
-    close(found[6][INNER], deviation[INNER], 1e-3)
+    close(values[6][INNER], deviation[INNER], 1e-3)
 
 
 def test_surroundings_are_means_and_their_changes(scene):
-    found = planes("surroundings", scene)
+    values = planes("surroundings", scene)
     for place_, (side, tone) in enumerate((s, t) for s in (7, 19, 41) for t in scene.tones):
-        close(found[place_][INNER], averaged(tone, side)[INNER], 1e-3)
-    mean = found[0]
-    close(found[9][:, 14:], mean[:, 14:] - mean[:, :-14])  # 14 columns to the left
-    close(found[13][:-20], mean[:-20] - mean[20:])  # 20 rows down
-    close(found[9][:, :14], mean[:, :14] - mean[:, :1])  # beyond the border lies the border
+        close(values[place_][INNER], averaged(tone, side)[INNER], 1e-3)
+    mean = values[0]
+    close(values[9][:, 14:], mean[:, 14:] - mean[:, :-14])  # 14 columns to the left
+    close(values[13][:-20], mean[:-20] - mean[20:])  # 20 rows down
+    close(values[9][:, :14], mean[:, :14] - mean[:, :1])  # beyond the border lies the border
 
 
 def test_a_column_is_walked_from_below_and_from_above(scene):
-    found = planes("scans", scene)
+    values = planes("scans", scene)
     steep = np.sqrt(averaged(np.abs(slopes(scene.tones[0])[1]), 3, 5))
     bright, colours = averaged(scene.tones[0], 5), averaged(scene.colour, 3)
     hue, edge = averaged(scene.hue, 3), averaged(np.hypot(*slopes(scene.tones[0])), 3, 5)
@@ -156,26 +167,26 @@ def test_a_column_is_walked_from_below_and_from_above(scene):
                 hue[rows, x].max(),
                 edge[rows, x].sum(),
             ]
-            close([plane[y, x] for plane in found[first : first + 6]], expected, 1e-3)
+            close([plane[y, x] for plane in values[first : first + 6]], expected, 1e-3)
 
 
 @pytest.mark.parametrize("width", [1, 2, 7, 8])
 def test_a_row_is_walked_from_the_middle_outwards(width):
     plane = np.random.default_rng(width).random((3, width)).astype(np.float32)
-    found, half = outwards(plane), width // 2
+    values, half = outwards(plane), width // 2
     for y, x in np.ndindex(plane.shape):
         met = plane[y, half : x + 1] if x >= half else plane[y, x:half]
-        assert found[y, x] == met.max()
+        assert values[y, x] == met.max()
 
 
 def test_paths_are_the_integrals_of_their_costs_along_the_cheapest_path(scene):
     edge = np.hypot(*slopes(scene.tones[0]))
     hue, distance = np.minimum(scene.hue, 10), np.minimum(scene.colour, 15)
     costs = edge, edge / 2 + hue / 20, 0.03 * distance
-    for cost, found in zip(costs, planes("paths", scene), strict=True):
+    for cost, values in zip(costs, planes("paths", scene), strict=True):
         expected, _ = MCP_Geometric(0.005 + cost).find_costs(np.argwhere(scene.patch))
         # A step aslant is 1 % shorter than the root of 2, and a cost is rounded to 1e-4.
-        close(found, expected, 0.02)
+        close(values, expected, 0.02)
 
 
 def test_barriers_are_the_greatest_of_four_pixels(scene):
@@ -190,26 +201,26 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
         np.maximum(averaged(yellow, 3) - averaged(yellow, 15), 0),
         np.maximum(averaged(tones[0], 15) - averaged(tones[0], 3), 0),
     ]
-    found = planes("barriers", scene)
-    for mine, plane in zip(found, expected, strict=False):
+    values = planes("barriers", scene)
+    for mine, plane in zip(values, expected, strict=False):
         close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
-    for mine, plane in zip(found[10:15], found[:5], strict=True):
+    for mine, plane in zip(values[10:15], values[:5], strict=True):
         np.testing.assert_array_equal(mine, outwards(plane))
 
 
 def test_squared_barriers_are_costs_of_a_path(scene):
     edge, relative, *_, around, relative_around = planes("barriers", scene)
-    for cost, found in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
+    for cost, values in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
         expected, _ = MCP_Geometric(0.005 + np.minimum(cost, 6.5)).find_costs(
             np.argwhere(scene.patch)
         )
-        close(found, expected, 0.02)
+        close(values, expected, 0.02)
 
 
 def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
-    found = features(scene, ALL)
+    values = features(scene, ALL)
     names = names_of(ALL)
-    over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
+    over, around = (values[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
     close(reach(scene), (over / 1.0 + around / 1.5) / 2)
 
 
@@ -229,3 +240,55 @@ def test_steepness_does_not_depend_on_where_arrays_lie_in_memory():
         for place_, values in zip(moved, (across, down), strict=True):
             place_[:] = values
         np.testing.assert_array_equal(steepness(moved), first)
+
+
+def street(road, elsewhere=(10, 200, 90), shape=(40, 60)):
+    """An image with one colour in the reference patch and another one elsewhere."""
+    patch = patch_mask(*shape, PATCH)
+    return np.where(patch[..., None] > 0, road, elsewhere).astype(np.uint8)
+
+
+def run(image):
+    return exposure.bind(exposure.ExposureSettings(), None)(View.of(image))
+
+
+def test_the_patch_turns_grey():
+    image = street((48, 96, 192))
+    patch = patch_mask(40, 60, PATCH) > 0
+    assert (run(image).image[patch] == 96).all()
+
+
+def test_each_channel_is_multiplied_everywhere():
+    output = run(street((48, 96, 192)))
+    assert output.image[0, 0, [0, 2]].tolist() == [20, 45]
+
+
+def test_what_is_brighter_than_the_patch_is_compressed_and_keeps_its_order():
+    # 96 + 159 (x - 96) / (x - 96 + 159), with x of 200, of 2 * 200, and of 1.
+    found = run(street((48, 96, 192), elsewhere=(200, 200, 1))).image[0, 0].tolist()
+    assert found == [200, 159, 0]
+    greys = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)[None]
+    tones = expose(greys, np.full(3, 3.0), LEVEL)[0, :, 0].astype(int)
+    assert (np.diff(tones[:64]) >= 1).all()
+    assert (np.diff(tones) >= 0).all()
+    assert tones[32] == 96
+    assert tones[-1] < 255
+
+
+def test_the_median_is_what_counts_not_what_stands_on_the_road():
+    image = street((48, 48, 48))
+    image[:, 32:] = 255  # two fifths of the patch
+    assert gains(image, PATCH)[0] == 2.0
+
+
+@pytest.mark.parametrize(("grey", "gain"), [(0, 6.0), (1, 6.0), (255, LEVEL / 255)])
+def test_gains_are_bounded(grey, gain):
+    assert gains(street((grey,) * 3), PATCH)[0] == gain
+
+
+def test_the_same_scene_under_another_exposure_gives_nearly_the_same_image():
+    rng = np.random.default_rng(0)
+    light = rng.uniform(40, 100, (40, 60, 3))
+    dim = run(np.rint(light).astype(np.uint8)).image.astype(int)
+    bright = run(np.rint(light * [1.8, 1.5, 1.2]).astype(np.uint8)).image.astype(int)
+    assert np.abs(dim - bright).max() <= 4

@@ -23,7 +23,7 @@ from roadeval.pipeline.stage import TrainingSet, View
 HEIGHT, WIDTH = 120, 160
 ROAD = np.array([120, 120, 120])
 SHADE = np.array([0.38, 0.40, 0.44])
-"""What is left of red, green and blue where the sky alone gives light."""
+"""Shares of red, green and blue under the light of the sky alone."""
 SPOT = np.s_[70:105, 50:110]
 """Where the pictures have their dark spot: on the road before the vehicle."""
 BELOW = np.where(np.arange(GRID[0]) < 4, 0.01, 0.9)[:, None] * np.ones(GRID)
@@ -95,17 +95,17 @@ def test_the_level_of_a_road_mostly_in_the_shade_is_that_of_its_lit_part():
 
 
 def test_features_are_relative_to_lit_road():
-    found = features_of(look(road(ROAD * SHADE), BELOW))
+    values = features_of(look(road(ROAD * SHADE), BELOW))
     dark, lit = np.rint(ROAD * SHADE) + 8, ROAD + 8
     light = np.log(dark).mean() - np.log(lit).mean()
     logs = np.log(dark / lit)
     np.testing.assert_allclose(
-        found[:3, 90, 80], [light, logs[0] - logs[1], logs[2] - logs[1]], atol=1e-4
+        values[:3, 90, 80], [light, logs[0] - logs[1], logs[2] - logs[1]], atol=1e-4
     )
-    np.testing.assert_allclose(found[5, 90], found[5, 90, ::-1], atol=1e-6)
-    assert found[8, HEIGHT - 1, 10] == pytest.approx(0, abs=1e-4)  # lit road alone below
-    assert found[8, 40, 80] == pytest.approx(light, abs=1e-4)  # shade on the way
-    assert found[-1, 90, 80] == pytest.approx(0.9)
+    np.testing.assert_allclose(values[5, 90], values[5, 90, ::-1], atol=1e-6)
+    assert values[8, HEIGHT - 1, 10] == pytest.approx(0, abs=1e-4)  # lit road alone below
+    assert values[8, 40, 80] == pytest.approx(light, abs=1e-4)  # shade on the way
+    assert values[-1, 90, 80] == pytest.approx(0.9)
 
 
 # --- Learning -------------------------------------------------------------------------------------
@@ -174,9 +174,9 @@ def test_the_odds_are_those_of_the_features():
     blue = features_of(seen)[BLUE, 90, 80]
     for odds in (0.25, 1.0, 4.0):
         expected = odds * np.exp(50 * blue - 3)
-        found = probability(seen, model(50.0, -3.0), odds)
-        assert found[90, 80] == pytest.approx(expected / (1 + expected), rel=1e-4)
-        assert not found[~seen.candidates].any()
+        values = probability(seen, model(50.0, -3.0), odds)
+        assert values[90, 80] == pytest.approx(expected / (1 + expected), rel=1e-4)
+        assert not values[~seen.candidates].any()
 
 
 def test_shade_becomes_lit_road_each_channel_apart():
@@ -189,8 +189,8 @@ def test_shade_becomes_lit_road_each_channel_apart():
 def test_half_a_doubt_is_half_the_gain(monkeypatch):
     monkeypatch.setattr(gated, "SOFTNESS", 1)
     seen = look(road(ROAD * SHADE), BELOW)
-    whole, half = (gains(seen, share * seen.candidates.astype(np.float32)) for share in (1, 0.5))
-    np.testing.assert_allclose(half**2, whole, rtol=1e-5)
+    full, half = (gains(seen, share * seen.candidates.astype(np.float32)) for share in (1, 0.5))
+    np.testing.assert_allclose(half**2, full, rtol=1e-5)
 
 
 def test_shadow_is_what_is_more_likely_shaded_road_than_not(monkeypatch):
@@ -263,8 +263,8 @@ def test_a_wide_image_is_judged_as_the_reduced_one_and_compensated_at_its_own_si
 # --- Its oracle -----------------------------------------------------------------------------------
 
 
-def told(image, shadow):
-    """What the filter makes of an image once it knows what is shadow."""
+def brightened_by_truth(image, shadow):
+    """Return the image that the filter makes with the true shadow."""
     return gated.oracle(GatedSettings(), model(), View.of(image), shadow).image
 
 
@@ -272,10 +272,10 @@ def test_true_shadow_is_brightened_whatever_was_learnt():
     image = road(ROAD * SHADE[::-1])
     truth = np.zeros((HEIGHT, WIDTH), np.uint8)
     truth[SPOT] = 1
-    np.testing.assert_allclose(told(image, truth)[75:100, 55:105], 120, atol=1)
+    np.testing.assert_allclose(brightened_by_truth(image, truth)[75:100, 55:105], 120, atol=1)
 
 
 @pytest.mark.parametrize("nothing", np.uint8([0, 255]), ids=["no shadow", "nobody knows"])
 def test_without_true_shadow_the_image_passes_bit_for_bit(nothing):
     image = road(ROAD * SHADE)
-    assert told(image, np.full((HEIGHT, WIDTH), nothing)) is image
+    assert brightened_by_truth(image, np.full((HEIGHT, WIDTH), nothing)) is image

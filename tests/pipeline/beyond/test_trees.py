@@ -10,7 +10,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from roadeval.data import CERTAIN, Packed
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, opinions
-from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, balanced_back, grow
+from roadeval.pipeline.beyond.trees import ALL, NODES, Blend, TreesSettings, class_weights, grow
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import reach, scene_of
 from roadeval.pipeline.stage import MisfitError, Output, StageError, TrainingSet, View
@@ -57,9 +57,9 @@ def features_and_road(seed=0, count=600):
 def test_the_arrays_say_what_scikit_learns_trees_say(weighted):
     values, road = features_and_road(count=1000)
     values = values.round(0)  # so few that each has a bin, as in scikit-learn
-    weights = balanced_back(road, 0.2) if weighted else None
+    weights = class_weights(road, 0.2) if weighted else None
     forest = grow(values, road, weights, SMALL.trees, 0)
-    found = forest.sums(np.ascontiguousarray(values.T))
+    sums = forest.sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(
         learning_rate=trees.RATE,
         max_iter=SMALL.trees,
@@ -69,15 +69,17 @@ def test_the_arrays_say_what_scikit_learns_trees_say(weighted):
         early_stopping=False,
         random_state=0,
     ).fit(values, road, sample_weight=weights)
-    np.testing.assert_allclose(found, boosting.decision_function(values), atol=1e-5)
+    np.testing.assert_allclose(sums, boosting.decision_function(values), atol=1e-5)
 
 
-def test_the_same_seed_grows_the_same_trees(sample, forest):
-    again = trees.fit(sample, SMALL).forest
-    for field in fields(forest):
-        np.testing.assert_array_equal(getattr(again, field.name), getattr(forest, field.name))
-    other = trees.fit(replace(sample, seed=1), SMALL).forest
-    assert (other.feature != forest.feature).any()
+def test_the_same_seed_grows_the_same_trees():
+    sample = every_pixel((9,))
+    first, again, other = (
+        trees.fit(replace(sample, seed=seed), SMALL).forest for seed in (0, 0, 1)
+    )
+    for field in fields(first):
+        np.testing.assert_array_equal(getattr(again, field.name), getattr(first, field.name))
+    assert (other.feature != first.feature).any()
 
 
 def test_a_pavement_of_the_roads_grey_is_told_from_it_by_the_kerb(learnt):
@@ -115,7 +117,7 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
 
 
 def opinion_of(road):
-    """What a method says that knows the left side alone, by its mask and by two planes."""
+    """Return the output of a method that knows the left side alone: its mask and two planes."""
     codes = np.where(road, 60000, 3000).astype(np.uint16)
     return Output(mask=Packed.of(road), by_class=(codes, 65535 - codes))
 
@@ -126,11 +128,11 @@ def test_a_mirrored_image_has_the_mirrored_opinion():
     where = np.array([[0, 0], [20, 3], [2, 30]])
     sample = TrainingSet((image,), *where, np.array([True, False]), opinions=(opinion,))
     straight, mirrored = at_samples(sample, partial(trees.see, replace(SMALL, opinion=True)))
-    known = len(names_of(SMALL.features))
+    count = len(names_of(SMALL.features))
     sure = np.log(60000 / 5535)
     expected = [[sure, -sure], [-np.log(62535 / 3000), np.log(62535 / 3000)]]
-    np.testing.assert_allclose(straight[:, known:], expected, rtol=1e-3)
-    np.testing.assert_array_equal(straight[:, known:], mirrored[:, known:])
+    np.testing.assert_allclose(straight[:, count:], expected, rtol=1e-3)
+    np.testing.assert_array_equal(straight[:, count:], mirrored[:, count:])
 
 
 def test_a_mask_alone_says_how_far_its_edge_is():
@@ -174,33 +176,33 @@ def test_trees_that_no_training_gives_are_refused(forest, changed, why):
 
 
 def test_trees_for_other_features_are_a_misfit(learnt):
-    known = len(names_of(SMALL.features))
-    with pytest.raises(MisfitError, match=f"grown on {known} features .* computes 3;"):
+    count = len(names_of(SMALL.features))
+    with pytest.raises(MisfitError, match=f"grown on {count} features .* computes 3;"):
         trees.bind(replace(SMALL, features=("place",)), learnt)
 
 
 VIEW = View.of(picture(9)[0])
 WIDE = View.of(picture(9, height=36, width=48)[0])
-"""Of another camera than `VIEW`, by its size."""
+"""A view of another camera than that of `VIEW`, by its size."""
 
 
 @pytest.mark.parametrize(("view", "weight"), [(VIEW, 1.0), (WIDE, 4.0)])
 def test_the_distance_weighs_more_where_another_camera_taught(learnt, view, weight):
-    found, expected = (
-        trees.bind(replace(SMALL, reach_weight=each), learnt)(view).probability
-        for each in (None, weight)
+    probability, expected = (
+        trees.bind(replace(SMALL, reach_weight=chosen), learnt)(view).probability
+        for chosen in (None, weight)
     )
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(probability, expected)
 
 
 def test_an_adapted_model_knows_the_cameras_of_both(sample, learnt):
-    own = picture(13, height=36, width=48)
-    frame, row, column = np.indices((1, *own[1].shape)).reshape(3, -1)
+    drawn = picture(13, height=36, width=48)
+    frame, row, column = np.indices((1, *drawn[1].shape)).reshape(3, -1)
     more = trees.adapt(
-        learnt, TrainingSet((own[0],), frame, row, column, own[1].ravel() == 1), SMALL
+        learnt, TrainingSet((drawn[0],), frame, row, column, drawn[1].ravel() == 1), SMALL
     )
-    assert [more.knows(each.image) for each in (VIEW, WIDE)] == [True, True]
-    assert [learnt.knows(each.image) for each in (VIEW, WIDE)] == [True, False]
+    assert [more.knows(view.image) for view in (VIEW, WIDE)] == [True, True]
+    assert [learnt.knows(view.image) for view in (VIEW, WIDE)] == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -235,9 +237,9 @@ def test_what_stands_on_top_sees_the_base_as_its_last_feature(sample, learnt):
     assert adapted.base is learnt
     assert adapted.inputs == learnt.inputs
     values = np.ascontiguousarray(np.concatenate(at_samples(sample, partial(trees.see, SMALL))).T)
-    known = learnt.log_odds(values, 0.5)
+    odds = learnt.log_odds(values, 0.5)
     top = replace(adapted, base=None)
-    expected = top.log_odds(np.concatenate([values, known[None]]), 0.5)
+    expected = top.log_odds(np.concatenate([values, odds[None]]), 0.5)
     np.testing.assert_array_equal(adapted.log_odds(values, 0.5), expected)
     assert (adapted.forest.feature == learnt.inputs).any()
 

@@ -11,11 +11,11 @@ from roadeval.pipeline.paper import post
 from roadeval.pipeline.paper.post import PostSettings
 from roadeval.pipeline.stage import Output, View
 from tests.pipeline import reference
-from tests.pipeline.images import mask, masks
+from tests.pipeline.images import masks
 
 
 def seen(road):
-    """What post-processing sees after a stage with this mask."""
+    """Return the view of post-processing after a stage with this mask."""
     view = View.of(np.zeros((*road.shape, 3), np.uint8))
     return view.after(Output(mask=Packed.of(road)))
 
@@ -88,21 +88,8 @@ def test_closing_fills_gaps_no_wider_than_the_element_and_keeps_the_border_as_it
     filled[: gaps[0] + 2] = 1
     element = np.array([reach])
     for way in (1, -1):
-        found = closing(road[None, ::way].astype(np.uint8), element)
-        assert found.tolist() == [filled[::way].tolist()]
-
-
-def test_the_boundary_is_the_inner_edge_and_runs_along_the_image_border():
-    road = mask("....", ".###", ".###", ".###")
-    edge = boundary(road, post.structuring_element(3))
-    assert (edge == mask("....", ".###", ".#.#", ".###")).all()
-
-
-@pytest.mark.parametrize("side", range(1, 16, 2))
-def test_structuring_elements_are_squares(side):
-    element = as_mask(post.structuring_element(side))
-    assert element.shape == (side, side)
-    assert element.all()
+        closed = closing(road[None, ::way].astype(np.uint8), element)
+        assert closed.tolist() == [filled[::way].tolist()]
 
 
 @given(st.integers(1, 5000))
@@ -119,13 +106,13 @@ def test_the_elements_side_is_the_odd_number_nearest_to_1_percent_of_the_width(w
 @given(masks)
 def test_the_largest_component_is_kept(road):
     labels, count = ndimage.label(road, np.ones((3, 3)))
-    kept = keep_region(road)
+    largest = keep_region(road)
     if count == 0:
-        assert not kept.any()
+        assert not largest.any()
     else:
         sizes = [(labels == k).sum() for k in range(1, count + 1)]
         # The first of the largest: SciPy numbers components in the order of their first pixels.
-        np.testing.assert_array_equal(kept, labels == 1 + int(np.argmax(sizes)))
+        np.testing.assert_array_equal(largest, labels == 1 + int(np.argmax(sizes)))
 
 
 # --- Eq. 23 ---------------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
+from roadeval.kernels import KERNELS
+from roadeval.pipeline.colour_table import FEW, table_of
 from roadeval.pipeline.paper import svm
 from roadeval.pipeline.paper.svm import SvmSettings
 from roadeval.pipeline.stage import TrainingSet, View
@@ -52,7 +54,7 @@ def case(request):
 
 
 def road(stage, colours):
-    """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
+    """Return the mask of ``(n, 3)`` colours, as an image of one row."""
     return stage(View.of(colours[None])).mask.pixels()[0]
 
 
@@ -96,7 +98,7 @@ def test_a_penalty_beyond_is_refused():
 @pytest.mark.parametrize("red", [0, 110, 255])
 def test_the_mask_equals_the_definition_next_to_the_threshold(case, red):
     settings, machine, stage, _ = case
-    margins, error = svm._margins(machine, settings)
+    margins, error = svm.colour_margins(machine, settings)
     assert error < 1e-5  # or the bound would decide nothing
     quick = margins(red).ravel()
     near = np.argsort(np.abs(quick))[:1000]
@@ -134,9 +136,9 @@ def test_a_machine_that_learnt_nothing_calls_nothing_road():
 
 def test_a_colour_is_decided_alike_whatever_is_decided_with_it(case):
     settings, machine, *_ = case
-    whole = svm.decision(COLOURS[:500], machine, settings)
+    together = svm.decision(COLOURS[:500], machine, settings)
     alone = [svm.decision(COLOURS[i : i + 1], machine, settings).item() for i in range(500)]
-    assert whole.tolist() == alone
+    assert together.tolist() == alone
 
 
 def test_the_machine_is_scikit_learns(case):
@@ -167,3 +169,38 @@ def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
         accuracy[kernel] = ((values > 0) == training.road).mean()
     assert accuracy["linear"] < 0.8
     assert accuracy["rbf"] > 0.9
+
+
+GREEN, BLUE = np.indices((256, 256))
+
+
+def margin(red):
+    """Positive inside a ball around a colour, and nowhere 0."""
+    away = (red - 90) ** 2 + (GREEN - 140.0) ** 2 + (BLUE - 120.0) ** 2
+    return 60.0**2 - 0.5 - away
+
+
+def decide(colours):
+    r, g, b = colours.T.astype(np.int64)
+    return (r - 90) ** 2 + (g - 140) ** 2 + (b - 120) ** 2 < 60**2
+
+
+def planes(colours):
+    """``(n, 3)`` colours as an image of one row."""
+    return tuple(np.ascontiguousarray(colours[None, :, c]) for c in range(3))
+
+
+def every_colour(red):
+    g, b = np.indices((256, 256), np.uint8).reshape(2, -1)
+    return np.stack([np.full_like(g, red), g, b], axis=1)
+
+
+def test_every_colour_is_decided_as_by_the_definition():
+    counts = []
+    table = table_of((margin, 20.0), lambda c: counts.append(len(c)) or decide(c))
+    for red in (0, 29, 30, 31, 90, 147, 150, 255):
+        colours = every_colour(red)
+        np.testing.assert_array_equal(
+            KERNELS.look_up_colours(planes(colours), table)[0], decide(colours)
+        )
+    assert 0 < sum(counts) < FEW

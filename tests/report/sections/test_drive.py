@@ -1,19 +1,47 @@
 """The parts of a drive's report: what each says where numbers lack or cannot be sure."""
 
+import math
+from typing import Any
+
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
 
+from roadeval.data import ERRORS
 from roadeval.evaluation.score.scoreboard import Effect
-from roadeval.report.blocks import Figure, Table, Text
+from roadeval.report.blocks import (
+    Command,
+    Figure,
+    Heading,
+    KeepTogether,
+    Table,
+    Text,
+    TwoColumns,
+    plain,
+)
+from roadeval.report.captions import caption
+from roadeval.report.document import document, page_document
+from roadeval.report.findings import Findings, NotableFrame
+from roadeval.report.images import LayerImage
 from roadeval.report.sections.drive import filter_effect, regions, thresholds
+from roadeval.report.sections.frames import FrameBrowser, strip, worst_frames
+from roadeval.report.sections.ground import UNSURE, distance_table
+from roadeval.report.sections.summary import warnings
+from roadeval.report.tables import rates_table
+from roadeval.results.facts import TrainingFacts
 from roadeval.results.tables import read_table
+from tests.evaluation.making import a_table
 from tests.report.making import (
     VARIANTS,
     a_difference,
+    a_total,
     by_rate,
+    column,
     opened,
+    rates,
     some_findings,
+    the,
 )
 
 
@@ -101,3 +129,131 @@ def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near
     assert chart.names == ["1", "8"]
     assert [each.name for each in chart.series] == ["filtered", "unfiltered"]
     assert [*chart.series[0].points()] == [(1, 25)]
+
+
+def a_frame(number, **changes):
+    plain = {
+        "rates": {"filtered": rates(0.4, 0.3, 0.2), "unfiltered": rates(0.5, 0.6, 0.7)},
+        "parts": {"svm": 0.1, "filter": 0.2, "post": 0.1},
+        "notes": ["A note.", "Another."],
+    }
+    return NotableFrame(number, 12_345_000_000, "filtered", **plain | changes)
+
+
+def shown(findings):
+    return [block.blocks for block in worst_frames(findings) if isinstance(block, KeepTogether)]
+
+
+def said(blocks):
+    return [block.text for block in the(TwoColumns, blocks).left]
+
+
+def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is_told():
+    (blocks,) = shown(some_findings(worst=[a_frame(7)], inspect=None))
+    assert not [block for block in blocks if isinstance(block, Command)]
+    assert caption("no command") in [block.text for block in blocks if isinstance(block, Text)]
+
+
+def test_outcomes_are_at_most_640_pixels_across_and_layers_300():
+    image, mask = np.zeros((4, 700, 3), np.uint8), np.zeros((4, 700), np.uint8)
+    outcome, layer = (LayerImage(title, image, ERRORS, mask) for title in ("errors", "svm"))
+    frame = NotableFrame(
+        7, 0, "filtered", {"filtered": rates(0.4)}, images=[outcome], layers=[[layer]]
+    )
+    found = strip(frame, ["filtered"])
+    assert [[across(each) for each in row] for row in found.rows] == [[640], [300]]
+
+
+def across(picture):
+    """Pixels across a picture's file."""
+    content = np.frombuffer(picture.image.content, np.uint8)
+    return cv2.imdecode(content, cv2.IMREAD_COLOR).shape[1]
+
+
+def bold(table, title):
+    return [cell.text for cell in column(table, title) if cell.bold]
+
+
+def test_an_undefined_rate_is_never_the_best():
+    findings = some_findings()
+    findings.totals["filtered"]["post"]["ERR"] = math.nan
+    assert bold(rates_table(findings.facts), "ERR") == ["12.00"]
+
+
+ALONE = {"filtered": {"post": a_total(0.1)}}
+
+
+def test_undefined_rates_are_told_and_how_often():
+    undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
+    totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
+    assert list(warnings(some_findings(totals=totals))) == [
+        "filtered: of 1,200 frames, undefined and left out: FNR on 1,200 and FPR on 3."
+    ]
+
+
+def test_a_drive_that_trained_itself_says_so():
+    own = some_findings(totals=ALONE, training=TrainingFacts("truth"))
+    assert [text.partition(" (")[0] for text in warnings(own)] == [
+        "Trained on frames of this drive"
+    ]
+    given = TrainingFacts("truth", model="city.model")
+    assert not list(warnings(some_findings(totals=ALONE, training=given)))
+
+
+NAMES = ["filtered", "unfiltered"]
+
+
+def row(variant: str, measure: str, where: str, value: float, sway: float) -> dict[str, Any]:
+    own = {"variant": variant, "measure": measure, "where": where, "frames": 9, "missing": 1}
+    return own | {"value": value, "p95": 0.5, "low": value - sway, "high": value + sway / 2}
+
+
+def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
+    rows = [
+        row("filtered", "ERR", "0-10m", 0.10, 0.02),
+        row("filtered", "ERR", "from_above", 0.10, 0.02),
+        row("unfiltered", "ERR", "0-10m", 0.13, 0.05),
+        row("unfiltered", "ERR", "from_above", 0.11, 0.05),
+    ]
+    first, ranges, second, *_ = distance_table(rows, NAMES).rows
+    assert [plain(cell) for cell in first[1:3]] == ["10.0", f"{UNSURE}10.0"]
+    assert plain(ranges[1]) == "8.0\N{EN DASH}11.0"
+    assert [plain(cell) for cell in second[1:3]] == ["13.0", "11.0"]
+    brief = distance_table(rows, NAMES, brief=True)
+    assert brief.columns == ["ERR, %", "0\N{EN DASH}10 m", "by area"]
+    assert [plain(cell) for cell in brief.rows[0][1:]] == ["10.0", f"{UNSURE}10.0"]
+    assert f"{UNSURE}: a camera that stands" in brief.caption
+
+
+def test_an_interval_of_errors_ends_at_what_an_error_can_be():
+    wrong = np.arange(40) % 20 == 0  # one frame in twenty, all of it
+    words = {"variant": "filtered", "stage": "post", "region": "0-10m"}
+    rows = pd.DataFrame({**words, "N": 9, "FP": 9 * wrong, "FN": 0})
+    found = some_findings(table=lambda _: rows).by_distance
+    mean, low, high = found["0-10m", "filtered"]
+    assert (mean, low) == (0.05, 0.0)
+    assert 0.05 < high < 1
+
+
+def headings(made):
+    return [block.text for block in made.blocks if isinstance(block, Heading) and block.level == 1]
+
+
+def test_a_page_has_the_sections_of_the_report():
+    drive = findings()
+    parts = {"filtered": {"svm": 0.2, "post": -0.1}}
+    vars(drive).update(regions=of_regions("interior"), error_parts=parts)
+    frames = FrameBrowser([], [], [])
+    paper, page = (headings(made) for made in (document(drive), page_document(drive, frames)))
+    assert "Over thresholds" in page
+    assert {*paper} - {*page} == {"The worst frames of filtered"}
+
+
+@pytest.mark.parametrize(("frames", "size", "rows"), [(50, 10, 5), (301, 20, 16)])
+def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
+    table = a_table({("filtered", "post"): [10] * frames}).assign(drive="street", camera="")
+    tables = {"frames": table, "windows": read_table("windows", "")}
+    windows = Findings("drive.rrd", some_findings().facts, tables.__getitem__).windows
+    assert set(windows["frames"][:-1]) == {size}
+    assert len(windows) == rows
+    assert windows["frames"].sum() == frames

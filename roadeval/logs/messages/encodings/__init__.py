@@ -1,1 +1,1 @@
-"""Message encodings, found by this folder: ``ENCODINGS`` of each file in it."""
+"""Message encodings; each module here lists its own in ``ENCODINGS``."""

@@ -42,11 +42,11 @@ def _cdr(schema: Schema | None) -> MessageReader | None:
 
     def read(data: Buffer) -> Any:
         message = _uncompressed(data)
-        # The library takes XCDR2 for its first version, in which longer numbers stand elsewhere.
+        # The library reads XCDR2 as the first version, which aligns longer numbers otherwise.
         return layouts.read(message, None if bytes(message[1:2]) >= b"\6" else decode)
 
     def stamp(data: Buffer) -> Any:
-        """Read only the first field, which is the stamp or a header that holds it."""
+        """Read only the first field: the stamp, or a header with the stamp."""
         first = _after_head(_uncompressed(data)).read(fields[:1])
         return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
 
@@ -54,7 +54,7 @@ def _cdr(schema: Schema | None) -> MessageReader | None:
 
 
 def _after_head(data: Buffer) -> FieldReader:
-    """Begin after the encapsulation: its second byte names byte order and version."""
+    """Begin after the encapsulation; its second byte determines byte order and version."""
     if len(data) < 4:
         raise BadMessage("a message without a head")
     kind = data[1]
@@ -63,7 +63,7 @@ def _after_head(data: Buffer) -> FieldReader:
 
 
 def _uncompressed(data: Buffer) -> Buffer:
-    """Undo rosbag2's compression message by message; CDR itself never begins like zstd."""
+    """Undo rosbag2's compression of single messages; CDR itself never begins like zstd."""
     if bytes(data[:4]) != _ZSTD:
         return data
     import zstandard
@@ -94,7 +94,7 @@ def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
 
 
 def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
-    """Read a field by its accessor: ``frame_id`` by ``FrameId``."""
+    """Read a field by its accessor, such as ``frame_id`` by ``FrameId``."""
     accessor = name.title().replace("_", "")
     if kind == "bytes":
         return memoryview(getattr(message, f"{accessor}AsNumpy")())
@@ -118,11 +118,11 @@ def _json_message(data: Buffer) -> Any:
     if isinstance(content := getattr(message, "data", None), str):
         message.data = base64.b64decode(content, validate=True)
     elif hasattr(message, "data"):  # else it is no image
-        message.data = bytes([*message.data])  # of a number it would make as many zeros
+        message.data = bytes([*message.data])  # bytes of a number would be as many zeros
     return message
 
 
-# --- Protocol Buffers, read by the descriptors that a schema holds --------------------------------
+# --- Protocol Buffers, read by the descriptors in a schema ----------------------------------------
 
 
 def _protobuf(schema: Schema | None) -> MessageReader | None:

@@ -1,1 +1,1 @@
-"""Label formats: files in which annotation tools keep shapes; ``FORMATS`` of each file here."""
+"""Formats of the files of annotation tools; each module here lists its own in ``FORMATS``."""

@@ -1,4 +1,4 @@
-"""Label format: Cityscapes' polygons, a JSON file an image, in their order from back to front."""
+"""Label format: Cityscapes' polygons from back to front, in a JSON file for each image."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any, Final
 from roadeval.logs.truth import drawn
 
 
-def _cityscapes(
+def _read_cityscapes(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.Drawing]:
+) -> Iterator[drawn.DrawnLabel]:
     shapes = (
-        drawn.Outline(area["label"], drawn.flat(area["polygon"]))
+        drawn.Outline(area["label"], drawn.flatten(area["polygon"]))
         for area in content["objects"]
         if not area.get("deleted")
     )
-    yield drawn.Drawing(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
+    yield drawn.DrawnLabel(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
 
 
 FORMATS: Final = (
     drawn.LabelFormat(
-        "Cityscapes", ".json", drawn.has("imgWidth", "imgHeight", "objects"), _cityscapes
+        "Cityscapes", ".json", drawn.has_keys("imgWidth", "imgHeight", "objects"), _read_cityscapes
     ),
 )

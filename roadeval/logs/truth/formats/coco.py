@@ -1,4 +1,4 @@
-"""Label format: COCO, polygons or runs of pixels, one JSON file."""
+"""Label format: COCO, polygons or runs of pixels in one JSON file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import drawn
 
 
-def _coco(path: Path, content: Mapping[str, Any], _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _read_coco(
+    path: Path, content: Mapping[str, Any], _: drawn.Size | None
+) -> Iterator[drawn.DrawnLabel]:
     categories = _by_id(path, "category", content["categories"])
     names = {number: str(category["name"]) for number, category in categories.items()}
     images = _by_id(path, "image", content["images"])
@@ -28,7 +30,7 @@ def _coco(path: Path, content: Mapping[str, Any], _: drawn.Size | None) -> Itera
     for number, image in images.items():
         size = drawn.size_in(image)
         shapes = _shapes(annotations[number], names, size)
-        yield drawn.Drawing(str(image["file_name"]), size, shapes)
+        yield drawn.DrawnLabel(str(image["file_name"]), size, shapes)
 
 
 def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[Any, Any]:
@@ -64,7 +66,7 @@ def _shapes(
 
 
 def run_lengths(label: str, counts: Any, stated: Any, size: drawn.Size | None) -> drawn.Runs:
-    """Return an area of runs, with the height and width that are stated beside them."""
+    """Return an area of runs; ``stated`` is the height and width beside them, if any."""
     if size is not None and stated is not None and (stated[1], stated[0]) != size:
         raise BadMessage(
             f"a mask of {label} that is {stated[1]}x{stated[0]}, on an image of {size[0]}x{size[1]}"
@@ -74,10 +76,10 @@ def run_lengths(label: str, counts: Any, stated: Any, size: drawn.Size | None) -
 
 
 def lengths_in(text: str) -> Sequence[int]:
-    """Return the lengths of the runs that COCO writes as a text.
+    """Return the lengths of runs from COCO's text.
 
-    A number has five bits in each letter, the lowest ones first, and from the fourth number on it
-    is the difference from the last but one.
+    Each letter has five bits of a number, the lowest ones first. From the fourth number on it is
+    the difference from the last but one.
     """
     lengths: list[int] = []
     value = shift = 0
@@ -85,7 +87,7 @@ def lengths_in(text: str) -> Sequence[int]:
         code = letter - 48
         value |= (code & 31) << shift
         shift += 5
-        if code & 32 and shift < 60:  # no number is longer
+        if code & 32 and shift < 60:  # numbers are not longer
             continue
         if code & 16:
             value -= 1 << shift
@@ -95,7 +97,7 @@ def lengths_in(text: str) -> Sequence[int]:
 
 
 def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
-    """Return one file, with a region of uncompressed runs for each image."""
+    """Return one file by its name, with a region of uncompressed runs for each image."""
     images, annotations = [], []
     for number, proposal in enumerate(proposals, 1):
         width, height = proposal.size
@@ -116,5 +118,7 @@ def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
 
 
 FORMATS: Final = (
-    drawn.LabelFormat("COCO", ".json", drawn.has("images", "annotations", "categories"), _coco),
+    drawn.LabelFormat(
+        "COCO", ".json", drawn.has_keys("images", "annotations", "categories"), _read_coco
+    ),
 )

@@ -1,4 +1,4 @@
-"""Label format: CVAT for images, one XML file."""
+"""Label format: CVAT for images, in one XML file."""
 
 from __future__ import annotations
 
@@ -10,20 +10,19 @@ from xml.etree.ElementTree import Element
 from roadeval.logs.errors import LogError
 from roadeval.logs.truth import drawn
 
-_NO_AREAS: Final = ("polyline", "points", "tag", "skeleton")
 
-
-def _cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _read_cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if content.find("track") is not None:
         raise LogError(f"{path}: tracks of a video; export it as CVAT for images")
     for image in content.iter("image"):
-        yield drawn.Drawing(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
+        yield drawn.DrawnLabel(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
 
 
 def _shapes(elements: Iterable[Element]) -> Iterator[drawn.Shape]:
-    # Equal heights stay in the order of the file. Datumaro writes shapes that a track has left.
+    # Shapes of equal height stay in the order of the file. Datumaro writes shapes ``outside``, too.
+    without_area = ("polyline", "points", "tag", "skeleton")
     for element in sorted(elements, key=lambda shape: float(shape.get("z_order", 0))):
-        if element.tag not in _NO_AREAS and element.get("outside") != "1":
+        if element.tag not in without_area and element.get("outside") != "1":
             yield _shape(element)
 
 
@@ -37,10 +36,10 @@ def _shape(element: Element) -> drawn.Shape:
         case "box":
             left, top, right, bottom = (float(at[name]) for name in ("xtl", "ytl", "xbr", "ybr"))
             box = drawn.rectangle(label, left, top, right, bottom)
-            return box.turned(degrees, ((left + right) / 2, (top + bottom) / 2))
+            return box.rotate(degrees, ((left + right) / 2, (top + bottom) / 2))
         case "ellipse":
             x, y, across, down = (float(at[name]) for name in ("cx", "cy", "rx", "ry"))
-            return drawn.ellipse(label, x, y, across, down).turned(degrees, (x, y))
+            return drawn.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
         case "cuboid":
             corners = [side + end for side in ("tl", "bl", "tr", "br") for end in "12"]
             points = [at[axis + corner] for corner in corners for axis in "xy"]
@@ -55,6 +54,6 @@ def _shape(element: Element) -> drawn.Shape:
 
 FORMATS: Final = (
     drawn.LabelFormat(
-        "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _cvat
+        "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _read_cvat
     ),
 )

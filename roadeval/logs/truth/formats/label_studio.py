@@ -1,4 +1,4 @@
-"""Label format: Label Studio's JSON and JSON-MIN; points are percents of the image's size."""
+"""Label format: Label Studio's JSON and JSON-MIN; coordinates are percents of the image's size."""
 
 from __future__ import annotations
 
@@ -21,13 +21,11 @@ from roadeval.logs.errors import BadMessage
 from roadeval.logs.truth import drawn
 
 _UPLOADED: Final = re.compile(r"^[0-9a-f]{8}-(?=.)")
-"""The hash that an upload puts before an image's name."""
+"""The hash that an upload adds before an image's name."""
 _AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL")
-"""Keys that say which pixels a region has; a key point has none, and is left out."""
+"""Keys of the pixels of a region; a key point has none of them, and is left out."""
 _TOOLS: Final = [f"{t}labels" for t in ("polygon", "rectangle", "ellipse", "brush", "bitmask")]
 _UNREADABLE: Final = {"points": ()}
-OPAQUE: Final = 127
-"""A pixel of a brush's edge belongs to it if it is opaque by more than a half."""
 
 
 def _is_label_studio(_: Path, content: Any) -> bool:
@@ -35,10 +33,10 @@ def _is_label_studio(_: Path, content: Any) -> bool:
     return isinstance(first, dict) and ("annotations" in first or "annotation_id" in first)
 
 
-def _label_studio(
+def _read_label_studio(
     _: Path, content: list[Mapping[str, Any]], size: drawn.Size | None
-) -> Iterator[drawn.Drawing]:
-    # An image may be in several tasks, and of merged projects two tasks may have the same number.
+) -> Iterator[drawn.DrawnLabel]:
+    # An image may be in several tasks, and merged projects may have two tasks of one number.
     tasks: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
     sizes: dict[str, drawn.Size | None] = {}
     for task in content:
@@ -51,18 +49,18 @@ def _label_studio(
         stated = (drawn.size_in(r, "original_width", "original_height") for r in regions)
         sizes[image] = sizes.get(image) or next(filter(None, stated), None)
     for image, annotations in tasks.items():
-        yield drawn.Drawing(image, sizes[image], _shapes(annotations, sizes[image] or size))
+        yield drawn.DrawnLabel(image, sizes[image], _shapes(annotations, sizes[image] or size))
 
 
 def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the regions of an annotation: its results, or, in JSON-MIN, all lists of a task."""
+    """Return the regions of an annotation: its results, or all lists of a task in JSON-MIN."""
     if "result" not in annotation:
         lists = [values for values in annotation.values() if isinstance(values, list)]
         return [region for region in chain.from_iterable(lists) if isinstance(region, dict)]
     regions: list[Mapping[str, Any]] = []
     for region in annotation["result"]:
-        is_whole = isinstance(region, dict) and isinstance(region.get("value"), dict)
-        if is_whole and region["value"]:
+        has_value = isinstance(region, dict) and isinstance(region.get("value"), dict)
+        if has_value and region["value"]:
             regions.append({**region, **region["value"]})
         elif not isinstance(region, dict) or region.get("type") != "relation":
             regions.append(_UNREADABLE)
@@ -70,17 +68,17 @@ def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str:
-    """Return the name of a task's image: of the field that the regions refer to, if it is there."""
+    """Return the name of a task's image, from the field that the regions refer to if possible."""
     data = task.get("data", task)
     texts = {name: text for name, text in data.items() if isinstance(text, str)}
-    wanted = [texts[name] for r in regions if (name := r.get("to_name")) in texts]
+    referred = [texts[name] for r in regions if (name := r.get("to_name")) in texts]
     files = [text for text in texts.values() if re.search(r"\.[a-zA-Z]\w{2,3}($|\?)", text)]
     others = [text for text in texts.values() if "/" in text]
-    (address, *_) = [*wanted, *files, *others]
+    (address, *_) = [*referred, *files, *others]
     is_address = "?" in address or "://" in address
     parts = urlsplit(address) if is_address else SplitResult("", "", address, "", "")
     query = parse_qs(parts.query)
-    # A file of the server's own disk, or of a storage behind it.
+    # The query names a file of the server's own disk, or of a storage behind it.
     path = query["d"][0] if "d" in query else parts.path
     if "fileuri" in query:
         path = urlsplit(b64decode(query["fileuri"][0]).decode()).path
@@ -99,7 +97,7 @@ def _shapes(
             f"it has {len(valid)} annotations (of annotators {who}): mark one of them as "
             "ground truth in Label Studio and export JSON, or delete the others"
         )
-    # A region and its class may be two results of one id, or of one place where there are no ids.
+    # A region and its class may be two results of one id, or of one place if there are no ids.
     merged: dict[Any, dict[str, Any]] = {}
     for region in _regions(valid[0]) if valid else ():
         place = json.dumps([region.get(name) for name in ("x", *_AREAS)])
@@ -125,25 +123,27 @@ def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
         return _brushed(label, region["rle"], size)
     if "imageDataURL" in region:
         pixels = to_labels(b64decode(region["imageDataURL"].partition(",")[2]), Limits())
-        return drawn.painted(label, pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
+        return drawn.runs_of(label, pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
     if "points" in region:
-        return drawn.Outline(label, drawn.flat((x * across, y * down) for x, y in region["points"]))
+        return drawn.Outline(
+            label, drawn.flatten((x * across, y * down) for x, y in region["points"])
+        )
     x, y = region["x"] * across, region["y"] * down
     if "radiusX" in region:
         across, down = region["radiusX"] * across, region["radiusY"] * down
-        return drawn.ellipse(label, x, y, across, down).turned(degrees, (x, y))
+        return drawn.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
     right, bottom = x + region["width"] * across, y + region["height"] * down
-    # It turns about its first corner.
-    return drawn.rectangle(label, x, y, right, bottom).turned(degrees, (x, y))
+    # A rectangle turns about its first corner.
+    return drawn.rectangle(label, x, y, right, bottom).rotate(degrees, (x, y))
 
 
 def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs:
     """Return an area that was painted with the brush.
 
-    The bytes are bits: 32 with the number of values, which are four a pixel; 5 with the bits of a
-    value, 4 for each of four lengths, all less one. Then come blocks: a bit whether one value is
-    repeated, 2 bits that choose a length, as many bits as that says with the number of values less
-    one, and the values. The fourth value of a pixel is how opaque it is.
+    The bytes are a stream of bits: 32 for the number of values, four a pixel; 5 for the width of a
+    value less one; 4 for each of four lengths less one. Then come blocks: 1 bit whether one value
+    is repeated; 2 bits that choose a length; a number of that length, the number of values less
+    one; and the values. The fourth value of a pixel is its opacity.
     """
     bits = "".join(f"{number:08b}" for number in numbers)
     place = 0
@@ -167,7 +167,8 @@ def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs
         start = end
     if start != total:
         raise BadMessage(f"a mask of {label} that does not fit its image")
-    return drawn.painted(label, values.reshape(size[1], size[0], 4)[..., 3] > OPAQUE)
+    # A pixel at the edge belongs to the area if it is opaque by more than a half.
+    return drawn.runs_of(label, values.reshape(size[1], size[0], 4)[..., 3] > 127)
 
 
-FORMATS: Final = (drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _label_studio),)
+FORMATS: Final = (drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _read_label_studio),)

@@ -1,4 +1,4 @@
-"""Label format: LabelMe, and X-AnyLabeling, which writes the same; a JSON file an image."""
+"""Label format: LabelMe and X-AnyLabeling, in a JSON file for each image."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from roadeval.images.decoding import to_rgb
 from roadeval.images.formats import Limits
 from roadeval.logs.truth import drawn
 
-_LINES: Final = ("point", "points", "line", "linestrip")
 _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "quadrilateral")
 
 
-def _labelme(
+def _read_labelme(
     path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.Drawing]:
-    areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in _LINES)
+) -> Iterator[drawn.DrawnLabel]:
+    lines = ("point", "points", "line", "linestrip")
+    areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in lines)
     size = drawn.size_in(content, "imageWidth", "imageHeight")
-    yield drawn.Drawing(str(path), size, map(_shape, areas))
+    yield drawn.DrawnLabel(str(path), size, map(_shape, areas))
 
 
 def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
-    label, points = shape["label"], drawn.flat(shape["points"])
+    label, points = shape["label"], drawn.flatten(shape["points"])
     match shape.get("shape_type") or "polygon", points:
         case "rectangle", [left, top, right, bottom]:
             return drawn.rectangle(label, left, top, right, bottom)
@@ -38,13 +38,13 @@ def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
             return drawn.hull(label, points)
         case "mask", [left, top, _, _]:
             pixels = to_rgb(b64decode(shape["mask"]), Limits())[..., 0] > 0
-            return drawn.painted(label, pixels, int(left), int(top))
+            return drawn.runs_of(label, pixels, int(left), int(top))
         case other, _:
             return drawn.Undrawn(label, f"{other} of {len(points) // 2} points")
 
 
 FORMATS: Final = (
     drawn.LabelFormat(
-        "LabelMe", ".json", drawn.has("shapes", "imageWidth", "imageHeight"), _labelme
+        "LabelMe", ".json", drawn.has_keys("shapes", "imageWidth", "imageHeight"), _read_labelme
     ),
 )

@@ -1,4 +1,4 @@
-"""Label format: Scalabel and BDD100K, polygons with curves or runs of pixels, JSON."""
+"""Label format: Scalabel and BDD100K, polygons with curves or runs of pixels in JSON."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from roadeval.logs.truth import drawn
 from roadeval.logs.truth.formats.coco import run_lengths
 
 _STEPS: Final = np.linspace(0, 1, 25)[1:, None]
-"""Where points lie on a curve, from its beginning to its end."""
+"""Positions of points on a curve, from its beginning to its end."""
 
 
 def _frames(content: Any) -> list[Mapping[str, Any]]:
-    """Return the images of a file; the older files of BDD100K have one each, with its name."""
+    """Return the images of a file; an older file of BDD100K has one image, and its name."""
     if isinstance(content, dict) and isinstance(content.get("frames"), list):
         frames: list[Mapping[str, Any]] = content["frames"]
         return [{"name": content.get("name"), **frame} for frame in frames]
@@ -29,12 +29,12 @@ def _is_scalabel(_: Path, content: Any) -> bool:
     return any("name" in frame and {"labels", "objects"} & {*frame} for frame in _frames(content))
 
 
-def _scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _read_scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     config = content.get("config") if isinstance(content, dict) else None
     common = drawn.size_in((config or {}).get("imageSize") or {})
     for frame in _frames(content):
         size = drawn.size_in(frame.get("size") or {}) or common
-        yield drawn.Drawing(str(frame["name"]), size, _shapes(frame, size))
+        yield drawn.DrawnLabel(str(frame["name"]), size, _shapes(frame, size))
 
 
 def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn.Shape]:
@@ -58,13 +58,13 @@ def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn
 
 
 def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> Sequence[float]:
-    """Return the points of a polygon, those of its curves included.
+    """Return the points of a polygon, with points on its curves.
 
-    A ``C`` is a point of a cubic curve: three in a row are two control points and the end, as
-    BDD100K's toolkit draws them; two in a row lie before a corner, as Scalabel draws them.
+    A ``C`` is a point of a cubic curve. Three in a row are two control points and the end, as in
+    BDD100K's toolkit; two in a row are the control points before a corner, as in Scalabel.
     """
     if types is None or "C" not in types:
-        return drawn.flat(points)
+        return drawn.flatten(points)
     corners = np.array([*points, points[0]], np.float64)
     ring = [corners[0]]
     for part in re.finditer("L|CC[CL]?|.", types[1 : len(points)]):
@@ -79,4 +79,4 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     return np.ravel(ring).tolist()
 
 
-FORMATS: Final = (drawn.LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _scalabel),)
+FORMATS: Final = (drawn.LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _read_scalabel),)

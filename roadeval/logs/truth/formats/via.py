@@ -1,4 +1,4 @@
-"""Label format: VGG Image Annotator (VIA) 1 and 2, a project or an export, one JSON file."""
+"""Label format: VGG Image Annotator (VIA) 1 and 2, a project or an export in one JSON file."""
 
 from __future__ import annotations
 
@@ -11,30 +11,25 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import drawn
 
 _CLASS: Final = ("class", "label", "category", "type", "name", "object")
-"""Names of the attribute that holds the class, where regions have several."""
-_NO_AREAS: Final = ("point", "polyline")
+"""Names of the attribute for the class, if regions have several attributes."""
 
 
 def _images(content: Any) -> Iterable[Mapping[str, Any]]:
     images = content.get("_via_img_metadata", content) if isinstance(content, dict) else {}
-    wanted = {"filename", "regions"}
-    return (i for i in images.values() if isinstance(i, dict) and wanted <= i.keys())
+    keys = {"filename", "regions"}
+    return (i for i in images.values() if isinstance(i, dict) and keys <= i.keys())
 
 
 def _regions(image: Mapping[str, Any]) -> list[Any]:
-    """Return the regions of an image: a list, in VIA 1 a table."""
+    """Return the regions of an image, which are a list, or a table in VIA 1."""
     regions = image["regions"] or []
     return [*regions.values()] if isinstance(regions, dict) else regions
 
 
-def _is_via(_: Path, content: Any) -> bool:
-    return any(_images(content))
-
-
-def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _read_via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     regions = [region for image in _images(content) for region in _regions(image)]
-    given = (region.get("region_attributes") for region in regions if isinstance(region, dict))
-    names = {name for attributes in given if isinstance(attributes, dict) for name in attributes}
+    tables = (region.get("region_attributes") for region in regions if isinstance(region, dict))
+    names = {name for table in tables if isinstance(table, dict) for name in table}
     usual = [name for usual in _CLASS for name in sorted(names) if name.lower() == usual]
     if len(names) > 1 and not usual:
         raise LogError(
@@ -43,13 +38,12 @@ def _via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.Drawi
         )
     attribute = next(iter([*usual, *names]), "class")
     for image in _images(content):
-        yield drawn.Drawing(str(image["filename"]), None, _shapes(_regions(image), attribute))
-
-
-def _shapes(regions: Iterable[Mapping[str, Any]], attribute: str) -> Iterator[drawn.Shape]:
-    for region in regions:
-        if region["shape_attributes"]["name"] not in _NO_AREAS:
-            yield _shape(region, attribute)
+        shapes = (
+            _shape(region, attribute)
+            for region in _regions(image)
+            if region["shape_attributes"]["name"] not in ("point", "polyline")
+        )
+        yield drawn.DrawnLabel(str(image["filename"]), None, shapes)
 
 
 def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
@@ -61,7 +55,7 @@ def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
     match at["name"]:
         case "polygon":
             points = zip(at["all_points_x"], at["all_points_y"], strict=True)
-            return drawn.Outline(value, drawn.flat(points))
+            return drawn.Outline(value, drawn.flatten(points))
         case "rect":
             left, top = at["x"], at["y"]
             return drawn.rectangle(value, left, top, left + at["width"], top + at["height"])
@@ -69,9 +63,11 @@ def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
             return drawn.ellipse(value, at["cx"], at["cy"], at["r"], at["r"])
         case "ellipse":
             x, y, degrees = at["cx"], at["cy"], math.degrees(at.get("theta", 0))
-            return drawn.ellipse(value, x, y, at["rx"], at["ry"]).turned(degrees, (x, y))
+            return drawn.ellipse(value, x, y, at["rx"], at["ry"]).rotate(degrees, (x, y))
         case other:
             return drawn.Undrawn(value, str(other))
 
 
-FORMATS: Final = (drawn.LabelFormat("VIA", ".json", _is_via, _via),)
+FORMATS: Final = (
+    drawn.LabelFormat("VIA", ".json", lambda _, content: any(_images(content)), _read_via),
+)

@@ -1,6 +1,6 @@
-"""Label format: YOLO segmentation, a text file an image; points are shares of its size.
+"""Label format: YOLO segmentation, in a text file for each image; points are shares of its size.
 
-Classes have numbers; what they are called stands in files that differ from tool to tool.
+Classes have numbers; their names are in other files, which differ from tool to tool.
 """
 
 from __future__ import annotations
@@ -14,19 +14,17 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import drawn
 
 _LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]", re.MULTILINE)
-"""How a line begins: names of classes, in a file beside the labels, do not."""
-_FARTHEST: Final = 2
-"""Shares beyond the image's edge are rounded ones, or cut off; others are pixels."""
+"""The beginning of a line of labels, which lines with names of classes do not have."""
 
 
 def _is_yolo(_: Path, content: str) -> bool:
     return not content.strip() or _LINE.search(content) is not None
 
 
-def _yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.Drawing]:
+def _read_yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if size is None:
         raise LogError(f"{path}: its points are shares of the image's size, which is not known")
-    yield drawn.Drawing(str(path), size, _shapes(content, size))
+    yield drawn.DrawnLabel(str(path), size, _shapes(content, size))
 
 
 def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
@@ -41,7 +39,7 @@ def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
                 raise ValueError
         except (ValueError, OverflowError) as error:
             raise BadMessage(f"line {number} is no class with an outline") from error
-        if max(map(abs, map(float, shares))) > _FARTHEST:
+        if max(map(abs, map(float, shares))) > 2:  # shares somewhat above 1 are rounded
             raise BadMessage(f"line {number} has points that are no shares of the image's size")
         if len(flat) == 4:
             x, y, width, height = (number / 2 for number in flat)
@@ -53,4 +51,4 @@ def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
             yield drawn.Outline(label, flat)
 
 
-FORMATS: Final = (drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _yolo),)
+FORMATS: Final = (drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _read_yolo),)

@@ -1,0 +1,302 @@
+"""The verdict on a result: how wrong its focus is, compared with what, and what to do next.
+
+What happened on these frames or drives is exact and comes first. What it says of others follows in
+one sentence, which never gives an interval of a single drive whose frames count as a few.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from operator import itemgetter
+from typing import Any, Final
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED
+from roadeval.data.words import counted, defined, in_percent, listing, number, percent
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference
+from roadeval.evaluation.tables import final_stages
+from roadeval.results.facts import EstimateFacts, UnlabelledFacts
+from roadeval.results.sentences import FINE, ROUNDING, Rates, is_sure
+
+NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
+BLIND: Final = f"{BASELINE}, which never looks at the image"
+FEW: Final = 5
+"""Independent frames below which those of one drive say little about other frames."""
+WEAK: Final = 0.02
+"""An error rate from which the preset ``robust`` is worth a try."""
+ROBUST: Final = "robust"
+NAMED: Final = 5
+"""Frames without truth that a verdict names."""
+
+
+def focus_of(variants: Iterable[str]) -> str | None:
+    """Return the variant that a result is about: the first that the user brought, else the first.
+
+    >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
+    'mine'
+    """
+    names = [name for name in variants if name != BASELINE]
+    brought = [name for name in names if name not in (FILTERED, UNFILTERED)]
+    return next(iter([*brought, *names]), None)
+
+
+def verdict(
+    totals: Mapping[str, Rates],
+    effects: Sequence[Effect],
+    thresholds: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    unlabelled: UnlabelledFacts | None = None,
+    estimated: EstimateFacts | None = None,
+) -> str:
+    """Return the verdict on a drive or a fleet, a few sentences about its focus.
+
+    They say how wrong it is and how; which variant is best, if it is another; how it compares with
+    the baseline and with the filter's absence; and what to do next.
+
+    Parameters
+    ----------
+    totals
+        Rates by variant and stage; empty if nothing was scored.
+    effects
+        Differences, those of final masks at least.
+    thresholds
+        What other thresholds would bring, as in `roadeval.results.facts.Facts`.
+    unlabelled
+        The frames to look at if nothing was scored.
+    estimated
+        The rates of the whole drive, from frames that were drawn at random.
+    """
+    if not totals:
+        return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
+    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
+    rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
+    best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
+    focus = focus_of(rates)
+    if best is None or focus is None:
+        return f"Nothing to compare: {TESTED} is undefined on every frame."
+    of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
+    whole_drive = [*from_labels(estimated, focus)]
+    lead = "On these alone: " if whole_drive else ""
+    return " ".join(
+        [
+            *whole_drive,
+            f"{lead}{_how_wrong(focus, rates[focus])}",
+            *_best_variant(best, focus, rates),
+            *_compared(focus, of_focus),
+            *_next_step(focus, rates, thresholds or {}),
+        ]
+    )
+
+
+def _how_wrong(name: str, rates: Rates) -> str:
+    """Return how many pixels a final mask has wrong, and which ones."""
+    if not defined(rates[TESTED]):
+        return f"{name}: {TESTED} is undefined on every frame."
+    of = counted(rates["frames"], "frame")
+    if rates.get("drives", 1) > 1:
+        of = counted(rates["drives"], "drive")
+    kinds = []
+    if defined(missed := rates["FNR"]):
+        share = f"{percent(missed, 1)} %" if missed >= ROUNDING else "almost nothing"
+        kinds.append(f"misses {share} of the road")
+    if defined(added := rates["FPR"]):
+        share = f"{percent(added, 1)} % of the rest" if added >= ROUNDING else "almost nothing else"
+        kinds.append(f"calls {share} road")
+    how = f" It {' and '.join(kinds)}." if kinds else ""
+    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({of}).{how}"
+
+
+def _best_variant(best: str, focus: str, rates: Mapping[str, Rates]) -> Iterator[str]:
+    """Yield which variant is best, if it is not the focus."""
+    if best != focus and rates[best][TESTED] != rates[focus][TESTED]:
+        yield f"Best here is {best}: {percent(rates[best][TESTED], 1)} %."
+
+
+def _compared(focus: str, differences: Mapping[str, Difference]) -> Iterator[str]:
+    """Yield how the focus compares with the baseline and without the filter, here and elsewhere."""
+    named = {BASELINE: BLIND} | ({UNFILTERED: "without the filter"} if focus == FILTERED else {})
+    there = [
+        (differences[base], name)
+        for base, name in named.items()
+        if base in differences and differences[base].units
+    ]
+    doubt = next((_no_interval(change) for change, _ in there if not change.is_zero), "")
+    points = [_points(change, name, alone=bool(doubt)) for change, name in there]
+    if points:
+        yield f"That is {', and '.join(points)}."
+    if BASELINE not in differences:
+        yield "There is no baseline: no labelled frame was used for training."
+    if doubt:
+        yield doubt
+
+
+def _no_interval(change: Difference) -> str:
+    """Return why a difference says nothing of other frames or drives; empty if it does."""
+    if change.low is None:
+        return f"{change.none_because[0].upper()}{change.none_because[1:]}."
+    if change.unit == "frames" and change.effective is not None and change.effective < FEW:
+        return f"One drive says little about others: {LEAST_GROUPS} drives would tell."
+    return ""
+
+
+def _points(change: Difference, name: str, *, alone: bool = False) -> str:
+    """Return a difference of error rates in points; not ``alone`` with what it is elsewhere.
+
+    >>> _points(Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91), "blind")
+    '2.0 points (1.0 to 3.0 on others) better than blind'
+    """
+    if change.is_zero:
+        return f"exactly as good as {name}"
+    doubt, digits = "", 1 if abs(change.mean) >= FINE else 2
+    if not alone and change.low is not None and change.high is not None:
+        least, most = (_size(end, digits) for end in _ends(change))
+        doubt = f" ({least} to {most} on others)"
+        doubt = doubt if is_sure(change) else " (may be chance)"
+    direction = "worse" if change.mean > 0 else "better"
+    return f"{_size(change.mean, digits)} points{doubt} {direction} than {name}"
+
+
+def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, Rates]) -> str:
+    """Return how a new mask compares with a base, here and on other frames or drives.
+
+    ``ends`` are the rates of the base and of the new mask, which are named if their difference is
+    that of the same frames or drives.
+
+    >>> change = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 9)
+    >>> print(describe_change(change, "new", "old", ({"ERR": 0.05}, {"ERR": 0.03})))
+    new is better than old: 3.0 % wrong instead of 5.0 % (9 frames). On others by 1.0 to 3.0 points.
+    """
+    if not change.units:
+        return f"Nothing to compare: {TESTED} is undefined on every {change.unit[:-1]}."
+    here = counted(change.units, change.unit[:-1])
+    if change.groups not in (None, change.units):
+        here += f" in {counted(change.groups or 0, 'group')}"
+    if change.is_zero:
+        return f"{new} is exactly as good as {base} ({here})."
+    if change.better is not None:
+        here += f", better on {change.better}, worse on {change.worse}"
+    before, after = (rates.get(TESTED) for rates in ends)
+    digits = 1 if abs(change.mean) >= FINE else 2
+    if defined(before) and defined(after) and abs(after - before - change.mean) < ROUNDING:
+        size = f"{_size(after, digits)} % wrong instead of {_size(before, digits)} %"
+    else:
+        size = f"by {_size(change.mean, digits)} points"
+    direction, doubt = "worse" if change.mean > 0 else "better", _no_interval(change)
+    if not doubt and is_sure(change):
+        least, most = (_size(end, digits) for end in _ends(change))
+        doubt = f"On others by {least} to {most} points."
+    elif not doubt:
+        family = ""
+        if is_sure(replace(change, p_holm=None)):
+            family = f", as {change.comparisons} masks are compared"
+        doubt = f"This may be chance{family}."
+    return f"{new} is {direction} than {base}: {size} ({here}). {doubt}"
+
+
+def _ends(change: Difference) -> list[float]:
+    """Return the ends of an interval, the one nearer to 0 first."""
+    assert change.low is not None
+    assert change.high is not None
+    return sorted((change.low, change.high), key=abs)
+
+
+def _size(fraction: float, digits: int) -> str:
+    return f"{abs(in_percent(fraction)):.{digits}f}"
+
+
+def _next_step(
+    focus: str, rates: Mapping[str, Rates], thresholds: Mapping[str, Mapping[str, Any]]
+) -> Iterator[str]:
+    """Yield what to do next: set thresholds, or try the preset that is best on real roads.
+
+    A threshold is not told if the error rate would hardly change.
+    """
+    steps = []
+    for name, best in thresholds.items():
+        now = rates.get(name, {}).get(f"pooled_{TESTED}", math.nan)
+        if abs(now - best[TESTED]) >= ROUNDING:
+            digits = 1 if abs(now - best[TESTED]) >= FINE else 2
+            lines = "` and `".join(best.get("lines", "").splitlines())
+            steps.append(
+                f"Set {'its threshold' if name == focus else f'the threshold of {name}'} to "
+                f"{best['threshold']:.2g}, not {best['own']:.2g}: then "
+                f"{in_percent(best[TESTED]):.{digits}f} % are wrong"
+                f"{f' (write `{lines}`)' if lines else ''}."
+            )
+    is_weak = focus in (FILTERED, UNFILTERED) and rates[focus][TESTED] >= WEAK
+    if is_weak and not steps and ROBUST not in rates:
+        steps.append("Next: try --variant robust.")
+    yield from steps
+
+
+def lowest(rates: Mapping[str, Rates]) -> str | None:
+    """Return the variant with the lowest error rate, of those that have masks of all frames.
+
+    ``rates`` are those of final masks by variant, with their number of ``frames``. None if no error
+    rate is defined.
+    """
+    most = max((mask.get("frames", 0) for mask in rates.values()), default=0)
+    full = {
+        name: mask[TESTED]
+        for name, mask in rates.items()
+        if mask.get("frames", 0) == most and defined(mask[TESTED])
+    }
+    return min(full, key=full.__getitem__, default=None)
+
+
+RANKED_BY: Final = {
+    "entropy": "{variant} is least sure where road is (entropy of its probability)",
+    "disagreement": "{variant} and the other variants differ most",
+    "flicker": "the mask of {variant} changes most from the frame before",
+}
+"""Why frames without truth come first, by what ranks them."""
+
+
+def without_truth(unlabelled: UnlabelledFacts | None) -> Iterator[str]:
+    """Yield what is known without truth: a bound on the greater of two error rates, and a rank."""
+    if unlabelled is None:
+        return
+    pairs = [
+        (share, one, other)
+        for one, shares in unlabelled.differing.items()
+        for other, share in shares.items()
+    ]
+    if pairs:
+        share, one, other = max(pairs, key=itemgetter(0))
+        yield (
+            f"{one} and {other} differ on {percent(share, 1)} % of the pixels, so one of the two "
+            f"is wrong on at least {math.floor(share * 500) / 10:.1f} %."
+        )
+    if unlabelled.look_at and unlabelled.sign:
+        why = RANKED_BY[unlabelled.sign].format(variant=unlabelled.variant)
+        frames = listing([str(frame) for frame in unlabelled.look_at[:NAMED]])
+        yield f"Look first at frames {frames}: there {why}. That is a rank, and no error rate."
+
+
+def from_labels(estimated: EstimateFacts | None, variant: str) -> Iterator[str]:
+    """Yield a variant's error rate on the whole drive, from its labelled frames, in a sentence."""
+    rate = estimated.rates.get(variant, {}).get(TESTED) if estimated else None
+    if estimated is None or rate is None:
+        return
+    ends = "no interval yet"
+    if rate.low is not None and rate.high is not None:
+        ends = f"{percent(rate.low, 1)} to {percent(rate.high, 1)}"
+    more = ""
+    if rate.to_halve:
+        more = f"; {number(rate.to_halve)} more drawn at random would halve that interval"
+    yield (
+        f"{variant}: {TESTED} {percent(rate.mean, 1)} % ({ends}) from {number(rate.labels)} "
+        f"labelled frames, drawn at random, of {number(rate.frames)}{more}. Errors on up to "
+        f"{percent(rate.missed, 0)} % of the frames may be missed by so few."
+    )
+    if rate.unseen:
+        yield (
+            f"{number(rate.unseen)} frames are far more in doubt than any that was drawn: the "
+            "upper end takes them for wrong altogether. More labels, drawn at random, would tell."
+        )
+    worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in estimated.apart.items())
+    if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:
+        yield f"Frames that were picked by rank are not in it; the worst: {listing(shown)}."

@@ -1,0 +1,228 @@
+"""The verdict: what the focus has wrong, compared with what, and what to do next."""
+
+from dataclasses import replace
+
+import pytest
+
+from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.results.facts import UnlabelledFacts
+from roadeval.results.verdict import describe_change, focus_of, verdict
+from tests.evaluation.making import a_difference
+
+WORDS = 60
+"""At most so many are read once."""
+WORSE = a_difference(9.2, 7.1, 11, units=91)
+BETTER = replace(WORSE, mean=-0.092, low=-0.11, high=-0.071)
+UNSURE = a_difference(-3.3, -20, 3.4, p=0.4, units=91)
+ZERO = a_difference(0, 0, 0, p=1.0, units=91)
+SHORT = replace(UNSURE, low=None, high=None, p=None, units=3, needed=10)
+ONE_SCENE = replace(BETTER, effective=2.1)
+OF_DRIVES = replace(BETTER, unit="drives", units=8, groups=8)
+FEW_DRIVES = replace(SHORT, unit="drives", groups=3, needed=6)
+
+
+def rates(error, frames=91, **more):
+    return {"ERR": error, "FNR": 2 * error, "FPR": error / 2, "frames": frames, **more}
+
+
+def drive(frames=91, **errors):
+    return {name: {"post": rates(error, frames)} for name, error in errors.items()}
+
+
+def fleet(drives, **errors):
+    return {name: {"post": rates(error, drives=drives)} for name, error in errors.items()}
+
+
+def against(base, **differences):
+    return [Effect(base, name, "post", True, {"ERR": d}) for name, d in differences.items()]
+
+
+def filtered(by_filter, of_blind):
+    return [*against("unfiltered", filtered=by_filter), *against("blind", filtered=of_blind)]
+
+
+PAIR = drive(filtered=0.028, unfiltered=0.12, blind=0.044)
+NO_ROAD_FOUND = {"net": {"post": {"ERR": 0.055, "FNR": 0.322, "FPR": 0.0004, "frames": 90}}}
+AT = {"own": 0.5, "threshold": 0.0138, "ERR": 0.027, "lines": "threshold = 0.01380"}
+CASES = {
+    "the filter helps": (
+        (PAIR, filtered(BETTER, UNSURE)),
+        "filtered: 2.8 % of the pixels are wrong (91 frames). It misses 5.6 % of the road and "
+        "calls 1.4 % of the rest road. That is 3.3 points (may be chance) better than blind, which "
+        "never looks at the image, and 9.2 points (7.1 to 11.0 on others) better than without the "
+        "filter. Next: try --variant robust.",
+    ),
+    "the filter harms": (
+        (drive(filtered=0.154, unfiltered=0.062), filtered(WORSE, WORSE)[:1]),
+        "filtered: 15.4 % of the pixels are wrong (91 frames). It misses 30.8 % of the road and "
+        "calls 7.7 % of the rest road. Best here is unfiltered: 6.2 %. That is 9.2 points (7.1 "
+        "to 11.0 on others) worse than without the filter. There is no baseline: no labelled frame "
+        "was used for training. Next: try --variant robust.",
+    ),
+    "both may be chance": ((PAIR, filtered(UNSURE, UNSURE)), None),
+    "one scene": (
+        (drive(robust=0.028, blind=0.12), against("blind", robust=ONE_SCENE)),
+        "robust: 2.8 % of the pixels are wrong (91 frames). It misses 5.6 % of the road and calls "
+        "1.4 % of the rest road. That is 9.2 points better than blind, which never looks at the "
+        "image. One drive says little about others: 6 drives would tell.",
+    ),
+    "a network alone that misses road": (
+        (NO_ROAD_FOUND, [], {"net": AT}),
+        "net: 5.5 % of the pixels are wrong (90 frames). It misses 32.2 % of the road and calls "
+        "almost nothing else road. There is no baseline: no labelled frame was used for training.",
+    ),
+    "a threshold is better": (
+        (
+            {"net": {"post": rates(0.055) | {"pooled_ERR": 0.055}}, **drive(blind=0.147)},
+            against("blind", net=BETTER),
+            {"net": AT},
+        ),
+        "net: 5.5 % of the pixels are wrong (91 frames). It misses 11.0 % of the road and calls "
+        "2.8 % of the rest road. That is 9.2 points (7.1 to 11.0 on others) better than blind, "
+        "which never looks at the image. Set its threshold to 0.014, not 0.5: then "
+        "2.7 % are wrong (write `threshold = 0.01380`).",
+    ),
+    "what was brought is the focus": (
+        (PAIR | drive(mine=0.019), [*filtered(BETTER, BETTER), *against("blind", mine=BETTER)]),
+        None,
+    ),
+    "what was brought is not the best": (
+        (drive(filtered=0.01, unfiltered=0.02, mine=0.05, blind=0.1), against("blind", mine=WORSE)),
+        "mine: 5.0 % of the pixels are wrong (91 frames). It misses 10.0 % of the road and calls "
+        "2.5 % of the rest road. Best here is filtered: 1.0 %. That is 9.2 points (7.1 to "
+        "11.0 on others) worse than blind, which never looks at the image.",
+    ),
+    "four variants": (
+        (PAIR | drive(robust=0.014, gated=0.06), against("blind", robust=BETTER, gated=WORSE)),
+        None,
+    ),
+    "tuned": ((drive(mine=0.05, mine_tuned=0.03, blind=0.1), against("blind", mine=BETTER)), None),
+    "masks of some frames": (
+        (drive(unfiltered=0.1) | drive(half=0.01, frames=40), []),
+        "half: 1.0 % of the pixels are wrong (40 frames). It misses 2.0 % of the road and calls "
+        "0.5 % of the rest road. Best here is unfiltered: 10.0 %. There is no baseline: no "
+        "labelled frame was used for training.",
+    ),
+    "as good as the baseline": (
+        (drive(net=0.054, blind=0.054), against("blind", net=ZERO)),
+        "net: 5.4 % of the pixels are wrong (91 frames). It misses 10.8 % of the road and calls "
+        "2.7 % of the rest road. That is exactly as good as blind, which never looks at the image.",
+    ),
+    "three frames": (
+        (drive(3, net=0.1, blind=0.12), against("blind", net=SHORT)),
+        "net: 10.0 % of the pixels are wrong (3 frames). It misses 20.0 % of the road and calls "
+        "5.0 % of the rest road. That is 3.3 points better than blind, which never looks at the "
+        "image. 3 frames are too few for an interval (10 are needed).",
+    ),
+    "undefined": (
+        (drive(net=float("nan")), []),
+        "Nothing to compare: ERR is undefined on every frame.",
+    ),
+    "no truth": (
+        ({}, []),
+        "Nothing to score: no frame with truth was evaluated.",
+    ),
+    "a fleet": (
+        (fleet(8, robust=0.02, blind=0.1), against("blind", robust=OF_DRIVES)),
+        "robust: 2.0 % of the pixels are wrong (8 drives). It misses 4.0 % of the road and "
+        "calls 1.0 % of the rest road. That is 9.2 points (7.1 to 11.0 on others) better than "
+        "blind, which never looks at the image.",
+    ),
+    "a fleet of three": (
+        (fleet(3, robust=0.02, blind=0.1), against("blind", robust=FEW_DRIVES)),
+        "robust: 2.0 % of the pixels are wrong (3 drives). It misses 4.0 % of the road and "
+        "calls 1.0 % of the rest road. That is 3.3 points better than blind, which never looks at "
+        "the image. 3 drives are too few for an interval (6 are needed).",
+    ),
+    "a fleet of one": ((fleet(1, robust=0.02, blind=0.1), against("blind", robust=BETTER)), None),
+    "a fleet of five hundred": (
+        (fleet(500, filtered=0.02, unfiltered=0.1, blind=0.1), filtered(OF_DRIVES, OF_DRIVES)),
+        None,
+    ),
+    "a rig": ((drive(filtered=0.02, unfiltered=0.03, blind=0.1), filtered(BETTER, BETTER)), None),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_verdict_says_how_wrong_compared_with_what_and_what_to_do_next(case):
+    given, sentences = CASES[case]
+    said = verdict(*given)
+    assert len(said.split()) <= WORDS
+    if sentences is not None:
+        assert said == sentences
+
+
+def test_without_truth_it_says_where_to_look_first():
+    unlabelled = UnlabelledFacts(90, "net", "entropy", [7, 3], {"net": {"filtered": 0.081}})
+    assert verdict({}, [], unlabelled=unlabelled) == (
+        "Nothing to score: no frame with truth was evaluated. net and filtered differ on 8.1 % of "
+        "the pixels, so one of the two is wrong on at least 4.0 %. Look first at frames 7 and 3: "
+        "there net is least sure where road is (entropy of its probability). That is a rank, and "
+        "no error rate."
+    )
+
+
+@pytest.mark.parametrize(
+    ("variants", "focus"),
+    [
+        (["filtered", "unfiltered", "blind"], "filtered"),
+        (["unfiltered", "blind"], "unfiltered"),
+        (["filtered", "unfiltered", "mine", "wide", "blind"], "mine"),
+        (["blind"], None),
+    ],
+)
+def test_the_focus_is_what_the_user_brought(variants, focus):
+    assert focus_of(variants) == focus
+
+
+# --- Two masks compared ---------------------------------------------------------------------------
+
+SAME = {"ERR": 0.154}, {"ERR": 0.062}
+OTHER = {"ERR": 0.2}, {"ERR": 0.062}
+
+
+@pytest.mark.parametrize(
+    ("change", "ends", "sentence"),
+    [
+        (
+            BETTER,
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). On others by 7.1 "
+            "to 11.0 points.",
+        ),
+        (
+            WORSE,
+            OTHER,
+            "new is worse than old: by 9.2 points (91 frames). On others by 7.1 to 11.0 points.",
+        ),
+        (UNSURE, OTHER, "new is better than old: by 3.3 points (91 frames). This may be chance."),
+        (
+            replace(BETTER, p_holm=0.06, comparisons=5),
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). This may be "
+            "chance, as 5 masks are compared.",
+        ),
+        (
+            ONE_SCENE,
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). One drive says "
+            "little about others: 6 drives would tell.",
+        ),
+        (
+            SHORT,
+            OTHER,
+            "new is better than old: by 3.3 points (3 frames). 3 frames are too few for an "
+            "interval (10 are needed).",
+        ),
+        (ZERO, SAME, "new is exactly as good as old (91 frames)."),
+        (replace(ZERO, units=0), SAME, "Nothing to compare: ERR is undefined on every frame."),
+        (
+            replace(OF_DRIVES, groups=7, better=7, worse=1),
+            SAME,
+            "new is better than old: 6.2 % wrong instead of 15.4 % (8 drives in 7 groups, better "
+            "on 7, worse on 1). On others by 7.1 to 11.0 points.",
+        ),
+    ],
+)
+def test_a_comparison_says_what_is_better_by_how_much_and_whether_elsewhere(change, ends, sentence):
+    assert describe_change(change, "new", "old", ends) == sentence
