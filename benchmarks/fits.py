@@ -87,7 +87,7 @@ def wrong(masks: Masks, *, moves: bool) -> Iterator[tuple[Finding, Masks]]:
         yield Finding("", Misfit.MOVED, right=right, down=down), moved
 
 
-def named(frames: Sequence[FrameResult], truth: Masks, masks: Masks | None) -> list[Finding]:
+def find_misfits(frames: Sequence[FrameResult], truth: Masks, masks: Masks | None) -> list[Finding]:
     """Return the misfits of frames with a truth, and with masks from elsewhere."""
     check = FitCheck(range(len(frames)))
     for place, result in enumerate(frames):
@@ -141,7 +141,7 @@ def main() -> None:
         ]
         for subject, name, planted, changed in cases:
             is_truth = subject == TRUTH
-            findings = named(frames, *((changed, None) if is_truth else (truth, changed)))
+            findings = find_misfits(frames, *((changed, None) if is_truth else (truth, changed)))
             is_named = is_it(findings, planted, subject)
             counts[subject] = counts[subject][0] + is_named, counts[subject][1] + 1
             mistakes += [] if is_named else [f"{drive.stem} {name} {planted}: {findings}"]
@@ -149,10 +149,10 @@ def main() -> None:
             for first in range(0, len(frames) - 39, 10):
                 for step in (1, 2):
                     part = slice(first, first + 40 * step, step)
-                    untouched.append(named(frames[part], truth[part], masks[part]))
+                    untouched.append(find_misfits(frames[part], truth[part], masks[part]))
                     mistakes += [f"{drive.stem} {name} {part}: {f}" for f in untouched[-1]]
         start = time.process_time()
-        named(frames, truth, methods["robust"])
+        find_misfits(frames, truth, methods["robust"])
         took = time.process_time() - start
         shares = [f"{good} of {every}" for good, every in counts.values()]
         shares.append(f"{sum(map(bool, untouched))} of {len(untouched)}")

@@ -27,7 +27,7 @@ from roadeval.recording.layout import RecordRule
 from roadeval.recording.recorder import recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.threads import map_ordered
 
 ALL: Final = RecordRule.parse("all")
 NOISY: Final = (
@@ -144,7 +144,7 @@ def measure_floor(
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
     with codecs, recorder:
-        for encoded, lines in ordered(work, held.frames(), jobs):
+        for encoded, lines in map_ordered(work, held.frames(), jobs):
             recorder.write(encoded, lines)
         recorder.finish({})
     return meter.read()

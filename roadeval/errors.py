@@ -1,17 +1,92 @@
 """The one base of every error that a user can cause and mend."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Self
+
+from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import without_secrets
 
 
 class RoadevalError(Exception):
-    """A known problem: one line that says what is wrong, where, and what to do next.
+    """A known problem: what is wrong, where, and what to do next.
 
-    A message names a setting as in a configuration, between backticks: ```topics.truth```. The
-    terminal puts the flag of the command line in its place. URLs in it lose their passwords.
-
-    The terminal prints it without a traceback and exits with code 1. Rooms derive their own
-    errors from it; anything else that escapes is a defect of the program.
+    As text it is one line, in which URLs lose their passwords, and which names settings as Python
+    does. The terminal prints it without a traceback, names settings by their flags, and exits with
+    code 1. Rooms derive their own errors from it; anything else that escapes is a defect of the
+    program.
     """
 
+    def __init__(
+        self,
+        problem: str = "",
+        *,
+        where: object = "",
+        setting: str = "",
+        remedy: str = "",
+    ) -> None:
+        super().__init__(problem)
+        self.problem = problem
+        self.where = where if isinstance(where, str) else str(where)
+        """The file, topic or frame, from the outside in."""
+        self.setting = setting
+        """The setting that is wrong, as ``topics.truth``; empty where it is none."""
+        self.remedy = remedy
+        """What to do next."""
+        self.in_file = False
+        """Whether settings stand in a file, where flags do not name them."""
+
+    @classmethod
+    def of(cls, error: RoadevalError, where: object = "", *, in_file: bool = False) -> Self:
+        """Return an error of this class that is another one, with a place before its own."""
+        made = cls.__new__(cls, *error.args)
+        made.__dict__.update(error.__dict__)
+        if where:
+            place = where if isinstance(where, str) else str(where)
+            made.where = Sentence(": ").join(filter(None, (place, error.where)))
+        made.in_file = in_file or error.in_file
+        return made
+
+    def rename_settings(self, rename: Callable[[str], str]) -> Self:
+        """Return the error with other names of its settings, as of those of another table."""
+        made = self.of(self)
+        made.setting = rename(self.setting) if self.setting else ""
+        for name in ("where", "problem", "remedy"):
+            text = name_settings(getattr(self, name), lambda setting: Setting(rename(setting)))
+            setattr(made, name, text)
+        return made
+
+    @property
+    def sentence(self) -> Sentence:
+        """The message: ``where: setting: problem; remedy``, without what is empty."""
+        return self._sentence(self.where)
+
+    @property
+    def reason(self) -> Sentence:
+        """The message without the place."""
+        return self._sentence("")
+
+    def _sentence(self, where: str) -> Sentence:
+        parts = filter(None, (where, Setting(self.setting), self.problem))
+        text = Sentence("; ").join(filter(None, (Sentence(": ").join(parts), self.remedy)))
+        if self.in_file:
+            text = name_settings(text, str)
+        return Sentence.of(
+            part if isinstance(part, Setting) else without_secrets(part) for part in text.parts
+        )
+
     def __str__(self) -> str:
-        return without_secrets(super().__str__())
+        return str(self.sentence)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remake, (type(self), self.args), self.__dict__
+
+
+class SettingError(RoadevalError, ValueError):
+    """Settings of one table that cannot be used; the message names them without their table."""
+
+
+def _remake(kind: type[RoadevalError], arguments: tuple[Any, ...]) -> RoadevalError:
+    """Make an error without its constructor, which may take other arguments."""
+    return kind.__new__(kind, *arguments)

@@ -33,7 +33,7 @@ from benchmarks.tables import (
 )
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
 from benchmarks.tables.measure import REPLAYS, SEEDS, STRANGERS, replay_seeds, round_all
-from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
+from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, write_tables
 from roadeval.version import VERSION
 
 ELSEWHERE = "elsewhere"
@@ -70,7 +70,7 @@ def main() -> int:
     numbers = load()
     if options.write:
         for path in DOCUMENTS:
-            path.write_text(written(path.read_text(), numbers))
+            path.write_text(write_tables(path.read_text(), numbers))
     problems = [
         f"{path.name}: {fault}" for path in DOCUMENTS for fault in faults(path.read_text(), numbers)
     ]

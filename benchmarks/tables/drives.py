@@ -88,7 +88,9 @@ def log(sources: Sources, name: str) -> Path:
     return sources.logs / f"{name}.mcap"
 
 
-def packed(journey: str, first: int = 0, last: int = 99_999) -> Callable[[Sources, str], Path]:
+def pack_journey(
+    journey: str, first: int = 0, last: int = 99_999
+) -> Callable[[Sources, str], Path]:
     """Return a function that packs the frames of a CamVid journey, ends included, one a second."""
 
     def find(sources: Sources, name: str) -> Path:
@@ -138,9 +140,11 @@ DRIVES: Final = {
         Drive("synthetic_2", "synthetic, seed 2", synthetic(2)),
         Drive("camvid_0016E5_15hz", "CamVid 0016E5, 15 Hz", log, CLASSES, tuned=True),
         Drive("camvid_0006R0_1hz", "CamVid 0006R0, 1 Hz", log, tuned=True),
-        Drive("camvid_0016E5_1hz", "CamVid 0016E5, 1 Hz", packed("0016E5", 390, 7920), CLASSES),
-        Drive("camvid_Seq05VD", "CamVid Seq05VD, 1 Hz", packed("Seq05VD"), CLASSES),
-        Drive("camvid_0001TP", "CamVid 0001TP, 1 Hz", packed("0001TP"), CLASSES),
+        Drive(
+            "camvid_0016E5_1hz", "CamVid 0016E5, 1 Hz", pack_journey("0016E5", 390, 7920), CLASSES
+        ),
+        Drive("camvid_Seq05VD", "CamVid Seq05VD, 1 Hz", pack_journey("Seq05VD"), CLASSES),
+        Drive("camvid_0001TP", "CamVid 0001TP, 1 Hz", pack_journey("0001TP"), CLASSES),
     )
 }
 """By name, in the tables' order."""

@@ -46,7 +46,7 @@ def load() -> dict[str, Any]:
     return numbers
 
 
-def written(text: str, numbers: Mapping[str, Any]) -> str:
+def write_tables(text: str, numbers: Mapping[str, Any]) -> str:
     """Return a text with every table between marks made anew; unknown names stay unchanged."""
 
     def anew(match: re.Match[str]) -> str:
@@ -75,11 +75,11 @@ def faults(text: str, numbers: Mapping[str, Any]) -> Iterator[str]:
             yield f"table {match['name']}: unknown, one of {', '.join(BLOCKS)}"
         elif match[0] != between_marks(match["name"], numbers):
             yield f"table {match['name']}: not what numbers.json gives; run with --write"
-    for number in loose(text):
+    for number in loose_numbers(text):
         yield f"{number!r}: a measured number outside a table; put it into one, or leave it out"
 
 
-def loose(text: str) -> list[str]:
+def loose_numbers(text: str) -> list[str]:
     """Return texts like measured numbers outside tables between marks and outside code."""
     for part in (_BLOCK, _CODE):
         text = part.sub("", text)

@@ -122,7 +122,7 @@ def render_drive(settings: RenderSettings) -> Iterator[SynthFrame]:
     def random(*purpose: int) -> np.random.Generator:
         return np.random.default_rng([settings.seed, *purpose])
 
-    journey = Journey.drawn(settings.duration, random(1))
+    journey = Journey.draw(settings.duration, random(1))
     scene = build(journey, random(2))
     movers = draw_traffic(journey, scene.road, scene.sun, random(3))
     sensor = Sensor(settings.width, settings.height, 1 / settings.rate_hz)

@@ -60,7 +60,7 @@ class Journey:
     roll: tuple[Sway, ...]
 
     @classmethod
-    def drawn(cls, duration: float, rng: np.random.Generator) -> Journey:
+    def draw(cls, duration: float, rng: np.random.Generator) -> Journey:
         """Draw the order of the last two stretches, and every sway."""
         last = rng.permutation([Stretch.NONE, Stretch.HEAVY])
 

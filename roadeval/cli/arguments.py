@@ -1,15 +1,15 @@
-"""From the words of a command line to the configuration of a run."""
+"""The arguments that several commands share, and the configuration that options make."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roadeval.cli.options import FLAGS, Given, with_flags
+from roadeval.cli.options import FLAGS, OptionValues, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
-    """Return an option with its help; whoever opens a file says what is wrong with it."""
+    """Return an option with its help; a file is checked where it is opened."""
     return typer.Option(*flags.split(), help=text, metavar=metavar, readable=False, **more)
 
 
@@ -31,19 +31,35 @@ def argument(metavar: str, text: str) -> Any:
 Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
 Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
 Json = Annotated[bool, option("--json", "Print the result on stdout as JSON.")]
-Quiet = Annotated[bool, option("-q --quiet", "No progress and no table; warnings stay.")]
+Quiet = Annotated[bool, option("-q --quiet", "No progress and no tables; warnings remain.")]
+
+
+def ending_in(*endings: str, unnamed: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+    """Return the callback of an option whose paths must have one of these endings.
+
+    Those that are ``unnamed`` are allowed, too, but the message does not propose them.
+    """
+
+    def check(paths: Any) -> Any:
+        for path in paths if isinstance(paths, list) else filter(None, [paths]):
+            if path.suffix.lower() not in (*endings, *unnamed):
+                choice = f"{', '.join(endings[:-1])} or {endings[-1]}"
+                raise typer.BadParameter(f"{path}: end it in {choice}")
+        return paths
+
+    return check
 
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """Turn a known problem inside the block into wrong usage."""
+    """Turn a `RoadevalError` inside the block into an error of usage."""
     try:
         yield
     except RoadevalError as error:
-        raise typer.BadParameter(with_flags(str(error))) from error
+        raise typer.BadParameter(with_flags(error.sentence)) from error
 
 
-def _condition(texts: list[str] | None) -> list[str] | None:
+def _check_conditions(texts: list[str] | None) -> list[str] | None:
     from roadeval.evaluation.comparison.conditions import Condition
 
     with usage():
@@ -56,52 +72,49 @@ Conditions = Annotated[
     list[str] | None,
     option(
         "--fail-if",
-        "As 'post.filtered.ERR > +0.5pp' (change; with 'surely' at the end: its whole interval) or "
-        "'> 20%' (level). Repeatable.",
+        "Condition for exit code 4: a change, as 'post.filtered.ERR > +0.5pp' (with 'surely' at "
+        "the end: its whole interval), or a level, as '> 20%'. Repeatable.",
         "CONDITION",
-        callback=_condition,
+        callback=_check_conditions,
     ),
 ]
 
 
-def configuration(given: Given) -> RunConfig:
-    """Return the configuration of a preset, a file, and options on top of both.
+def configuration(options: OptionValues) -> RunConfig:
+    """Return the configuration that a preset, a file, and options on top of both make.
 
-    A `typer.BadParameter` for a value that can be seen to be wrong without opening a file, or
-    options that do not go together; a `RoadevalError` for a file that cannot be used.
+    A `typer.BadParameter` if a value is wrong whatever the files hold, or options do not go
+    together; a `RoadevalError` if a file cannot be used.
     """
     from roadeval.config.camera_file import read_camera
     from roadeval.config.run import configure
     from roadeval.config.tables import ConfigError, in_file, read_tables
     from roadeval.config.variants import network_variant
 
-    preset = {"preset": given["preset"]} if "preset" in given else {}
+    preset = {"preset": options["preset"]} if "preset" in options else {}
     with usage():
-        _check_names(given, "variants", "nets", "topics.masks", "masks")
+        _check_names(options)
         config = configure(preset)
-    if path := given.get("config"):
+    if path := options.get("config"):
         tables = read_tables(path)
-        if preset and tables.get("preset", given["preset"]) != given["preset"]:
-            raise ConfigError(
-                f"{path}: starts from preset {tables['preset']}, not from {given['preset']}"
-            )
+        if preset and tables.get("preset", options["preset"]) != options["preset"]:
+            problem = f"starts from preset {tables['preset']}, not from {options['preset']}"
+            raise ConfigError(problem, where=path)
         config = configure({**preset, **tables}, where=str(path))
-    variants = [_variant(*each) for each in given.get("variants", ())]
-    variants += [network_variant(*each) for each in given.get("nets", ())]
-    masks = {name: _masks(name, path) for name, path in given.get("masks", ())}
+    variants = [_variant(name, path) for name, path in options.get("variants", ())]
+    variants += [network_variant(name, path) for name, path in options.get("nets", ())]
+    masks = {name: _mask_tables(name, path) for name, path in options.get("masks", ())}
     with usage():
-        config = config.override(
-            {**_tables(given), **_cameras(given), "masks": masks}
-        ).with_variants(variants)
-        config = config.with_tuned(given.get("tunes", ()))
-        if "only" in given:
-            config = config.override({"only": given["only"]})
-    if path := given.get("ground"):
+        config = config.override({**_tables(options), "masks": masks}).with_variants(variants)
+        config = config.with_tuned(options.get("tunes", ()))
+        if "only" in options:
+            config = config.override({"only": options["only"]})
+    if path := options.get("ground"):
         ground = read_camera(path, config.topics.image)
         with in_file(str(path)):
             config = config.override({"ground": ground})
-    chosen = {"training.frames", "training.placement", "training.gap"}
-    if config.training.model and not config.training.adapt and chosen & given.keys():
+    frame_options = {"training.frames", "training.placement", "training.gap"}
+    if config.training.model and not config.training.adapt and frame_options & options.keys():
         raise typer.BadParameter(
             "--train-frames, --train-on and --train-gap do not go with a model "
             f"({config.training.model})"
@@ -110,7 +123,7 @@ def configuration(given: Given) -> RunConfig:
 
 
 def _variant(name: str, path: str | None) -> Variant:
-    """Return the variant of a file or of a preset; with neither, of the preset of its name."""
+    """Return the variant that a file or a preset defines; by default the preset of its name."""
     from roadeval.config.tables import read_tables
     from roadeval.config.variants import PRESETS, Variant
 
@@ -121,8 +134,8 @@ def _variant(name: str, path: str | None) -> Variant:
         return Variant.of(name, {"preset": preset}, f"{FLAGS['variants']} {name} names no file")
 
 
-def _masks(name: str, path: str) -> dict[str, Any]:
-    """Return the table of masks of a folder or log, or of a file that describes them."""
+def _mask_tables(name: str, path: str) -> dict[str, Any]:
+    """Return the settings of masks that lie in a folder or log, or that a TOML file describes."""
     from roadeval.config.tables import in_file, read_tables
     from roadeval.config.variants import with_masks
 
@@ -134,56 +147,55 @@ def _masks(name: str, path: str) -> dict[str, Any]:
     return tables
 
 
-def _cameras(given: Given) -> dict[str, Any]:
-    """Return the topics of images as settings: of one camera, or of several."""
-    topics = given.get("cameras", ())
-    if len(topics) > 1:
-        return {"cameras": [{"image": topic} for topic in topics]}
-    own = _tables(given).get("topics", {})
-    return {"cameras": [], "topics": {**own, "image": topics[0]}} if topics else {}
+Camera = Annotated[str | None, option("--camera", "One of several cameras.", "NAME")]
 
 
-Camera = Annotated[str | None, option("--camera", "Of several cameras: this one alone.", "NAME")]
+def select_camera(result: Result_, name: str | None) -> Result_:
+    """Return the result of a rig's camera, by its name or the part by which the names differ.
 
-
-def of_camera(result: Result_, name: str | None) -> Result_:
-    """Return the result of a camera of a rig, by its name or the part of it that differs.
-
-    The result itself where no camera is named. Wrong usage if there is none of that name.
+    Return the result itself if no camera is named. A `typer.BadParameter` if there is no such one.
     """
     if name is None:
         return result
     from roadeval.data.words import short_names
 
-    short = {own: camera for camera, own in short_names([*result.cameras]).items()}
-    camera = short.get(name, name)
+    by_short_name = {short: camera for camera, short in short_names([*result.cameras]).items()}
+    camera = by_short_name.get(name, name)
     if camera not in result.cameras:
-        known = ", ".join(short) or "only one"
-        raise typer.BadParameter(f"--camera {name}: the result has {known}")
+        names = ", ".join(by_short_name) or "only one"
+        raise typer.BadParameter(f"--camera {name}: the result has {names}")
     return result.cameras[camera]
 
 
-def one_camera(given: Given) -> None:
-    """Refuse, as wrong usage, several cameras where a command looks at one."""
-    if len(given.get("cameras", ())) > 1:
+def check_one_camera(options: OptionValues) -> None:
+    """Raise a `typer.BadParameter` for several cameras."""
+    if len(options.get("cameras", ())) > 1:
         raise typer.BadParameter("--image-topic: this command takes one camera at a time")
 
 
-def _check_names(given: Given, *options: str) -> None:
+def _check_names(options: OptionValues) -> None:
+    """Raise a `ConfigError` if two variants have one name, or a name cannot be used."""
     from roadeval.config.variants import check_variant_name
     from roadeval.data import FILTERED, UNFILTERED
 
     taken = [FILTERED, UNFILTERED]
-    for name, _ in (each for option in options for each in given.get(option, ())):
-        check_variant_name(name, taken)
-        taken.append(name)
+    for option in ("variants", "nets", "topics.masks", "masks"):
+        for name, _ in options.get(option, ()):
+            check_variant_name(name, taken)
+            taken.append(name)
 
 
-def _tables(given: Given) -> dict[str, dict[str, Any]]:
-    """Arrange the values of ``table.key`` settings as a TOML file has them."""
-    tables: dict[str, dict[str, Any]] = {}
-    for setting, value in given.items():
+def _tables(options: OptionValues) -> dict[str, Any]:
+    """Return the values of options as the tables of a TOML file."""
+    tables: dict[str, Any] = {}
+    for setting, value in options.items():
         table, _, key = setting.partition(".")
         if key:
             tables.setdefault(table, {})[key] = dict(value) if key == "masks" else value
+    topics = options.get("cameras", ())
+    if len(topics) > 1:
+        tables["cameras"] = [{"image": topic} for topic in topics]
+    elif topics:
+        tables["cameras"] = []
+        tables["topics"] = {**tables.get("topics", {}), "image": topics[0]}
     return tables

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 NARROWEST: Final = 20
 STANDARD: Final = 80
-"""Columns. No terminal is narrower than the first, whatever ``COLUMNS`` says; the second is taken
-then."""
+"""Columns of a terminal. One that claims to be narrower than the first, as by ``COLUMNS``, is taken
+to have the second number."""
 _PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
@@ -36,12 +36,12 @@ def diagnostics() -> Console:
 
 
 def results() -> Console:
-    """Return a console on stdout, for what the user asked for."""
-    return _terminal(cast("IO[str]", _Trimmed(sys.stdout)))
+    """Return a console on stdout, for the results of a command."""
+    return _terminal(cast("IO[str]", _TrimmedStream(sys.stdout)))
 
 
 def show_next(out: Console, *commands: str) -> None:
-    """Print commands to type next; each names a program as it can be typed here."""
+    """Print the commands to type next; each begins with a program as it can be called here."""
     for command in commands:
         name, _, rest = command.partition(" ")
         beside = Path(sys.executable).with_name(name)
@@ -51,9 +51,9 @@ def show_next(out: Console, *commands: str) -> None:
 
 
 def _terminal(file: IO[str] | None = None) -> Console:
-    """Return Rich's console on a stream, standard error by default, with every string escaped.
+    """Return Rich's console on a stream, by default stderr; it escapes every string.
 
-    A `Text` is not escaped: only the program itself makes one.
+    It does not escape a `Text`, as only the program itself makes one.
     """
     from rich.console import Console
 
@@ -61,24 +61,24 @@ def _terminal(file: IO[str] | None = None) -> Console:
         def render_str(self, text: str, **options: Any) -> Text:
             return super().render_str(visible(text), **options)
 
-    made = Terminal(file=file, stderr=file is None, highlight=False, markup=False, emoji=False)
-    if made.width < NARROWEST:
-        made.width = STANDARD
-    return made
+    terminal = Terminal(file=file, stderr=file is None, highlight=False, markup=False, emoji=False)
+    if terminal.width < NARROWEST:
+        terminal.width = STANDARD
+    return terminal
 
 
-class _Trimmed:
-    """A stream that drops the spaces at the ends of lines, which tables and sentences leave."""
+class _TrimmedStream:
+    """A stream that drops the spaces at the ends of lines, as tables have them."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        with _explained():
+        with _output_errors():
             return self._stream.write(_PADDING.sub(r"\1", text))
 
     def flush(self) -> None:
-        with _explained():
+        with _output_errors():
             self._stream.flush()
 
     def __getattr__(self, name: str) -> Any:
@@ -86,26 +86,26 @@ class _Trimmed:
 
 
 def emit(text: str) -> None:
-    """Write lines to stdout without wrapping: for machines, and for paths to copy."""
-    with _explained():
+    """Write lines to stdout without wrapping, for machines and for paths to copy."""
+    with _output_errors():
         sys.stdout.write(f"{visible_lines(text)}\n")
 
 
 def flush() -> None:
     """Flush stdout; an `OutputError` if that fails."""
-    with _explained():
+    with _output_errors():
         sys.stdout.flush()
 
 
 def drop() -> None:
-    """Drop what is still buffered for stdout: the interpreter would flush it at its end."""
+    """Drop what is still buffered for stdout, which the interpreter would flush at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def wrapped(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
-    """Wrap a sentence between words only, so that names and paths stay whole.
+def wrap(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
+    """Wrap a sentence between words only, so that no name or path is broken.
 
-    ``indent`` is the left margin, ``hang`` what is added to it from the second line on.
+    ``indent`` is the left margin; ``hang`` is added to it from the second line on.
     """
     from rich.text import Text
 
@@ -121,7 +121,8 @@ def wrapped(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
 
 
 @contextmanager
-def _explained() -> Iterator[None]:
+def _output_errors() -> Iterator[None]:
+    """Turn an OSError inside the block into an `OutputError`; a broken pipe stays one."""
     try:
         yield
     except BrokenPipeError:

@@ -9,7 +9,7 @@ class ExitCode(IntEnum):
     DONE = 0
     """Done."""
     FAILED = 1
-    """Something found by opening a file or writing one; one line on stderr says what."""
+    """A file cannot be read, used or written; one line on stderr says why."""
     USAGE = 2
     """The command line alone is wrong."""
     LOSS = 3
@@ -21,6 +21,6 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
     """Stopped by SIGINT, as Ctrl-C sends it."""
     BROKEN_PIPE = 141
-    """Whoever read stdout has gone, as with ``| head``."""
+    """The reader of stdout has ended, as with ``| head``."""
     TERMINATED = 143
     """Stopped by SIGTERM."""

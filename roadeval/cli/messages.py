@@ -15,25 +15,25 @@ from roadeval.runtime.text import debug, visible, visible_lines, without_secrets
 PROGRAM: Final = "roadeval"
 
 
-def error(sentence: object) -> None:
+def error(sentence: str) -> None:
     """Write an error: ``roadeval: error: ...``."""
     _write("error", "bold red", sentence)
 
 
-def warning(sentence: object) -> None:
+def warning(sentence: str) -> None:
     """Write a warning: ``roadeval: warning: ...``."""
-    _write("warning", "bold yellow", with_flags(str(sentence)))
+    _write("warning", "bold yellow", sentence)
 
 
-def note(sentence: object) -> None:
-    """Write what happens now, where it takes long: ``roadeval: note: ...``."""
-    _write("note", "bold", with_flags(str(sentence)))
+def note(sentence: str) -> None:
+    """Write what happens now, if that takes long: ``roadeval: note: ...``."""
+    _write("note", "bold", sentence)
 
 
 def losses(sentences: Sequence[str]) -> ExitCode:
     """Write which parts of a log were lost, ``roadeval: lost: ...``, and return the exit code."""
     for sentence in sentences:
-        _write("lost", "bold yellow", with_flags(sentence))
+        _write("lost", "bold yellow", sentence)
     return ExitCode.LOSS if sentences else ExitCode.DONE
 
 
@@ -47,32 +47,33 @@ def conditions(held: Sequence[str], unjudged: Sequence[str]) -> ExitCode:
 
 
 def traceback(text: str) -> None:
-    """Write a traceback, where they are asked for."""
+    """Write a traceback, if ``ROADEVAL_DEBUG`` asks for it."""
     if debug():
         sys.stderr.write(visible_lines(text))
 
 
-def loops_missing() -> None:
+def warn_of_missing_loops() -> None:
     """Warn if frames take long because the package was installed without its compiled loops."""
     if kernels.missing():
         warning(
-            "the compiled loops are missing, and a frame takes several times as long: there was "
-            "no C compiler when roadeval was installed, or they are older than it: install it again"
+            "the compiled loops are missing, so a frame takes several times as long: there was no "
+            "C compiler when roadeval was installed, or the build is outdated; reinstall roadeval"
         )
 
 
-def interrupted(sentence: object) -> None:
+def interruption(sentence: str) -> None:
     """Write that a signal ended the command: ``roadeval: interrupted: ...``."""
     _write("interrupted", "bold yellow", sentence)
 
 
-def _write(kind: str, style: str, sentence: object) -> None:
-    said = visible(without_secrets(str(sentence)))
+def _write(kind: str, style: str, sentence: str) -> None:
+    """Write a line that names settings by their flags."""
+    text = visible(without_secrets(with_flags(sentence)))
     try:
         from rich.text import Text
 
-        line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", said)
+        line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", text)
         console.diagnostics().print(line, soft_wrap=True)
     except (ImportError, MemoryError):
-        # Where memory is short the library does not load.
-        sys.stderr.write(f"{PROGRAM}: {kind}: {said}\n")
+        # If memory is short, the library does not load.
+        sys.stderr.write(f"{PROGRAM}: {kind}: {text}\n")

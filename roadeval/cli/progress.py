@@ -11,12 +11,12 @@ from roadeval.cli import console, messages
 from roadeval.jobs.progress import Progress
 
 LINE_PERIOD_S: Final = 10.0
-"""At most one plain line in this time, so that a log file of a long run stays short."""
+"""Seconds between two plain lines, so that the log file of a long run stays short."""
 
 
 @contextmanager
-def watched(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
-    """Yield the function that a job calls with its progress; the display ends with the block."""
+def show(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
+    """Yield the function that a job calls with its progress; the display lasts for the block."""
     if quiet:
         yield lambda _progress: None
         return
@@ -31,9 +31,10 @@ def watched(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
 
 
 class Watch:
-    """Shows each progress on a `rich.progress.Progress`, which measures the pace in any case.
+    """Progress on a display of Rich, which also measures the pace.
 
-    With ``lines`` it writes plain ones: when a stage begins or ends, and one in `LINE_PERIOD_S`.
+    With ``lines`` it is written as plain lines: when a stage begins or ends, and in between every
+    `LINE_PERIOD_S` seconds.
     """
 
     def __init__(self, display: Any, write: Callable[[str], None], *, lines: bool) -> None:
@@ -52,22 +53,22 @@ class Watch:
         if begins:
             self._stage = progress.stage
             self._display.reset(self._task, completed=progress.done)
-        # Before the first item nothing is known; the bar shows that something moves.
+        # Before the first item is done the pace is not known; the bar shows that work goes on.
         total = progress.total if progress.done else None
         self._display.update(self._task, completed=progress.done, total=total)
-        text = self._words(progress)
+        text = self._describe(progress)
         self._display.update(self._task, description=text)
         due = time.monotonic() - self._written >= LINE_PERIOD_S
         if self._lines and (begins or due or progress.done == progress.total):
             self._written = time.monotonic()
             self._write(text)
 
-    def _words(self, progress: Progress) -> str:
-        """Describe it: ``replaying: 4 of 10 frames, 23.4 frames/s, 12 s left``."""
+    def _describe(self, progress: Progress) -> str:
+        """Return a line: ``replaying: 4 of 10 frames, 23.4 frames/s, 12 s left``."""
         if not progress.done:
             return progress.stage
-        of = f" of {progress.total}" if progress.total is not None else ""
-        parts = [f"{progress.done}{of} {progress.unit}"]
+        total = f" of {progress.total}" if progress.total is not None else ""
+        parts = [f"{progress.done}{total} {progress.unit}"]
         (task,) = self._display.tasks
         if task.speed:
             parts.append(f"{task.speed:.1f} {progress.unit}/s")
@@ -78,7 +79,7 @@ class Watch:
 
 
 def duration(seconds: float) -> str:
-    """Write a duration for a person.
+    """Return a duration in words.
 
     >>> duration(42.3), duration(600), duration(9000)
     ('42 s', '10 min', '2 h 30 min')

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM as an exception that unwinds the work, so that outputs are closed."""
+"""SIGINT and SIGTERM as an exception, so that outputs are closed."""
 
 from __future__ import annotations
 
@@ -12,15 +12,13 @@ from typing import Final, NoReturn
 from roadeval.cli.exit_codes import ExitCode
 
 EXIT_CODES: Final = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
-
-
 GRACE_S: Final = 0.05
-"""Signals so soon after the first count as one: ``timeout`` sends one to the process and another
-to its group."""
+"""Seconds in which further signals count as the first one: ``timeout`` sends one to the process and
+another to its group."""
 
 
 class Stopped(SystemExit):
-    """The user or the system asked the process to stop."""
+    """A request of the user or the system to stop."""
 
     def __init__(self, exit_code: ExitCode) -> None:
         super().__init__(int(exit_code))
@@ -28,28 +26,27 @@ class Stopped(SystemExit):
 
 
 @contextmanager
-def raised() -> Iterator[None]:
+def as_exceptions() -> Iterator[None]:
     """Turn the first SIGINT or SIGTERM into `Stopped`; a later one ends the process at once.
 
-    Python accepts handlers from the main thread only. In any other thread the signals keep the
-    handlers that they have.
+    Python accepts handlers from the main thread only; in any other thread nothing changes.
     """
-    before = {}
+    earlier = {}
     # `signal.signal` raises a ValueError outside the main thread.
     with suppress(ValueError):
         for number in EXIT_CODES:
-            before[number] = signal.signal(number, _stop)
+            earlier[number] = signal.signal(number, _stop)
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in earlier.items():
             signal.signal(number, handler)
 
 
 def _stop(number: int, _frame: FrameType | None) -> NoReturn:
-    for each in EXIT_CODES:
-        signal.signal(each, signal.SIG_IGN)
+    for stopping in EXIT_CODES:
+        signal.signal(stopping, signal.SIG_IGN)
     time.sleep(GRACE_S)
-    for each in EXIT_CODES:
-        signal.signal(each, signal.SIG_DFL)
+    for stopping in EXIT_CODES:
+        signal.signal(stopping, signal.SIG_DFL)
     raise Stopped(EXIT_CODES[signal.Signals(number)])

@@ -1,4 +1,4 @@
-"""The three streams of the process, prepared before anything is written to them."""
+"""The three standard streams of the process."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from typing import Any, Final
 from roadeval.runtime.text import UNENCODABLE
 
 MISLEADING: Final = ("MPLBACKEND", "RERUN")
-"""Variables for programs with windows or a viewer; here they would stop figures and recording."""
+"""Environment variables for programs with windows; here they would stop figures and recording."""
 
 
 def take_over(*, debug: bool) -> None:
-    """Prepare the streams of this process, and keep other libraries off them.
+    """Prepare the streams, and drop the messages that libraries write to them.
 
-    Messages of C libraries, of Rerun and of Python's warnings are dropped: the rooms report what
-    concerns the user. Only the reason of a crash is written; to ``debug`` everything is.
+    The program itself reports all that concerns the user. Only the reason of a crash is written;
+    with ``debug`` everything is.
     """
     _fill_closed()
-    sys.stderr = _stderr(os.dup(2))
+    encoding = sys.stderr.encoding if sys.stderr else None
+    own_file = BufferedWriter(_LossyFile(os.dup(2), "w"))
+    sys.stderr = TextIOWrapper(own_file, encoding, errors=UNENCODABLE, line_buffering=True)
     if not debug:
         _close_to_libraries()
     if isinstance(sys.stdout, TextIOWrapper):
@@ -33,9 +35,9 @@ def take_over(*, debug: bool) -> None:
 
 
 def _fill_closed() -> None:
-    """Open missing streams, so that no other file takes their numbers.
+    """Open missing streams, so that no other file gets their numbers.
 
-    Writing to standard output then still fails, as it should.
+    Writing to stdout then still fails, as it should.
     """
     for number, flags in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
@@ -49,15 +51,8 @@ def _fill_closed() -> None:
         sys.stdout = os.fdopen(1, "w", closefd=False)
 
 
-def _stderr(number: int) -> TextIOWrapper:
-    """Return standard error as a text stream, under a number of its own."""
-    encoding = sys.stderr.encoding if sys.stderr else None
-    buffered = BufferedWriter(_Lossy(number, "w"))
-    return TextIOWrapper(buffered, encoding, errors=UNENCODABLE, line_buffering=True)
-
-
-class _Lossy(FileIO):
-    """A file that ignores errors of writing: a closed stderr must not stop the work."""
+class _LossyFile(FileIO):
+    """A file that ignores errors of writing, as a closed stderr must not stop the work."""
 
     def write(self, content: Any) -> int:
         try:
@@ -67,10 +62,10 @@ class _Lossy(FileIO):
 
 
 def _close_to_libraries() -> None:
-    """Drop all messages but this program's own and the reason of a crash."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    os.close(nowhere)
+    """Drop all messages but the program's own and the reason of a crash."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    os.close(null)
     faulthandler.enable(sys.stderr, all_threads=False)
     logging.disable()
     if not sys.warnoptions:

@@ -27,14 +27,14 @@ import dataclasses
 import inspect
 import os
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
-from roadeval.config.tables import ConfigError, adapter, either, in_file, override, read_tables
+from roadeval.config.tables import ConfigError, adapter, in_file, list_names, override, read_tables
 from roadeval.config.variants import (
     PRESETS,
     TRAINED,
@@ -44,7 +44,7 @@ from roadeval.config.variants import (
     in_drive,
     pipeline_of,
     preset_of,
-    thresholded,
+    thresholded_variant,
     tuned_variant,
     variants_of,
     with_masks,
@@ -56,23 +56,21 @@ from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording.layout import RecordRule
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import visible, visible_lines
 from roadeval.training.settings import TrainingSettings
 
 OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks", "ground")
-"""The tables that may differ from drive to drive."""
+"""The tables that can differ between drives."""
 
 
 @dataclass(frozen=True)
 class RunConfig(LogConfig):
-    """Every option of a run.
-
-    A `ConfigError` if the parts do not go together.
-    """
+    """Every option of a run; a `ConfigError` if they do not go together."""
 
     preset: str = "paper"
-    """The preset that it started from."""
+    """The preset to which the other settings are changes."""
     pipeline: Pipeline = field(default_factory=lambda: pipeline_of(None, PRESETS["paper"]))
     """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings."""
     extra: tuple[Variant, ...] = ()
@@ -80,7 +78,7 @@ class RunConfig(LogConfig):
     only: tuple[str, ...] = ()
     """The variants that run, masks of other methods included; all of them by default."""
     cameras: tuple[CameraSettings, ...] = ()
-    """The cameras of a rig; none where one camera is replayed."""
+    """The cameras of a rig; empty if one camera is replayed."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
     """How every variant is trained and scored."""
@@ -100,71 +98,70 @@ class RunConfig(LogConfig):
         for name in self.only:
             if name not in names:
                 raise ConfigError(
-                    f"`only` {name}: there is no such variant; choose {either(names)}"
+                    f"there is no variant {name}",
+                    setting="only",
+                    remedy=f"choose {list_names(names)}",
                 )
         self._check_cameras()
         try:
             RecordRule.parse(self.output.record)
         except RoadevalError as error:
-            raise ConfigError(str(error)) from error
+            raise ConfigError.of(error) from error
         for key, ending in (("save", ".rrd"), ("mcap", ".mcap")):
             path = getattr(self.output, key)
             if path is not None and not path.endswith(ending):
-                raise ConfigError(f"`output.{key}` {path}: name a file that ends in {ending}")
+                problem = f"{path} does not end in {ending}"
+                raise ConfigError(problem, setting=f"output.{key}")
         if self.output.mcap is not None and self.frames.scale != 1:
-            raise ConfigError(
-                "`output.mcap` and `frames.scale` do not go together: reduced masks would not lie "
-                "over the log's images"
-            )
+            problem = "does not go with {frames.scale}: reduced masks would not lie over the images"
+            raise ConfigError(Sentence(problem), setting="output.mcap")
 
     def _check_cameras(self) -> None:
-        names = [visible(each.name or each.image) for each in self.cameras]
+        names = [visible(camera.name or camera.image) for camera in self.cameras]
         for name in names:
             if names.count(name) > 1:
-                raise ConfigError(f"camera {name}: given twice")
+                raise ConfigError("given twice", where=f"camera {name}")
             if name.strip("/").partition("/")[0] in RESERVED:
-                raise ConfigError(
-                    f"camera {name}: the name is reserved; give it another under [[cameras]]"
-                )
+                remedy = "give it another under [[cameras]]"
+                raise ConfigError("the name is reserved", where=f"camera {name}", remedy=remedy)
         topics = ("image", "truth", "shadow", "masks")
-        of_one = [f"topics.{name}" for name in topics if getattr(self.topics, name)]
-        of_one += ["ground"] * self.ground.given
-        if names and of_one:
-            raise ConfigError(
-                f"`{of_one[0]}`: which camera's? Name it under [[cameras]], beside its image"
-            )
+        single = [f"topics.{name}" for name in topics if getattr(self.topics, name)]
+        single += ["ground"] * self.ground.given
+        if names and single:
+            problem, remedy = "belongs to one of several cameras", "name it under [[cameras]]"
+            raise ConfigError(problem, setting=single[0], remedy=remedy)
         if names and (self.truth.path or self.masks):
-            raise ConfigError(
-                "labels that do not lie in the log belong to one camera: replay that one alone"
-            )
+            problem = "labels that do not lie in the log belong to one camera"
+            raise ConfigError(problem, remedy="replay that camera alone")
 
     def variants(self) -> tuple[Variant, ...]:
         """Return the variants that are computed: the two by default, then the extra ones."""
-        trained = (thresholded(name) for name, own in self.masks.items() if own.decide == TRAINED)
-        every = (*variants_of(self.pipeline, self.extra), *trained)
-        return tuple(each for each in every if not self.only or each.name in self.only)
+        trained = [name for name, masks in self.masks.items() if masks.decide == TRAINED]
+        variants = (*variants_of(self.pipeline, self.extra), *map(thresholded_variant, trained))
+        return tuple(v for v in variants if not self.only or v.name in self.only)
 
     def by_camera(self) -> dict[str, RunConfig]:
-        """Return the configuration of each camera by its name; of one camera alone by ``""``."""
+        """Return each camera's configuration by its name; a single camera has the name ``""``."""
         if not self.cameras:
             return {"": self}
         configs = {}
         for camera in self.cameras:
             topics: dict[str, Any] = {"image": camera.image, "masks": camera.masks}
-            # An empty name under [topics] takes no topic, of any camera.
-            topics |= {"truth": camera.truth} if camera.truth is not None else {}
-            topics |= {"shadow": camera.shadow} if camera.shadow is not None else {}
+            # If [topics] has an empty name for truth or shadow, no camera has a topic of it.
+            for name in ("truth", "shadow"):
+                if (topic := getattr(camera, name)) is not None:
+                    topics[name] = topic
             configs[visible(camera.name or camera.image)] = replace(
                 self, cameras=(), ground=camera.ground, topics=replace(self.topics, **topics)
             )
         return configs
 
     def pipelines(self) -> dict[str, Pipeline]:
-        """Return the pipeline of every variant, by name."""
+        """Return the pipelines of the variants by name."""
         return {variant.name: variant.pipeline for variant in self.variants()}
 
     def others_code(self) -> dict[str, str]:
-        """Return the digests of stages that are not roadeval's own, by their names in a chain."""
+        """Return the digests of stages that are not part of roadeval, by their names in a chain."""
         return {
             name: stage.code
             for pipeline in self.pipelines().values()
@@ -173,17 +170,16 @@ class RunConfig(LogConfig):
         }
 
     def resolved(self) -> RunConfig:
-        """Return the configuration with the settings that stages find in files.
+        """Return the configuration with the settings that stages read from files.
 
-        A `RoadevalError` if a file cannot be used, or a variant's final stage has no mask to start
-        from.
+        A `RoadevalError` if a file cannot be used, or no stage of a variant makes a mask for its
+        final stage.
         """
         for name, pipeline in self.pipelines().items():
-            if len(pipeline.masks()) < 2:  # the final one, and one before it
-                raise ConfigError(
-                    f"variant {name}: its chain ({', '.join(pipeline.chain)}) has no stage before "
-                    f"{FINAL_STAGE} that makes a road mask"
-                )
+            if len(pipeline.masks()) < 2:  # one of the final stage, and one before it
+                chain = ", ".join(pipeline.chain)
+                problem = f"its chain ({chain}) has no stage before {FINAL_STAGE} that makes a "
+                raise ConfigError(f"{problem}road mask", where=f"variant {name}")
         return self._with_pipelines(Pipeline.resolved)
 
     def without_places(self) -> RunConfig:
@@ -191,15 +187,14 @@ class RunConfig(LogConfig):
         return self._with_pipelines(Pipeline.without_places)
 
     def _with_pipelines(self, change: Callable[[Pipeline], Pipeline]) -> RunConfig:
-        extra = tuple(replace(each, pipeline=change(each.pipeline)) for each in self.extra)
+        extra = tuple(replace(variant, pipeline=change(variant.pipeline)) for variant in self.extra)
         return replace(self, pipeline=change(self.pipeline), extra=extra)
 
     def override(self, tables: Mapping[str, Any]) -> RunConfig:
         """Return the configuration with the values of some tables in place.
 
-        A `ConfigError` for a key or a value that cannot be used names it, and what is allowed. The
-        tables have the shape of a TOML file, without ``preset``; a variant of a name that is there
-        is replaced.
+        The tables have the shape of a TOML file, without ``preset``; a variant replaces one of the
+        same name. A `ConfigError` for a key or a value that cannot be used, with what is allowed.
         """
         pipeline = pipeline_of(self.pipeline, tables)
         check_tables(
@@ -208,7 +203,7 @@ class RunConfig(LogConfig):
         )
         only = tables.get("only", self.only)
         if not isinstance(only, list | tuple) or not all(isinstance(name, str) for name in only):
-            raise ConfigError("`only` must be a list of variants' names")
+            raise ConfigError("must be a list of variants' names", setting="only")
         config = replace(
             self,
             pipeline=pipeline,
@@ -220,49 +215,47 @@ class RunConfig(LogConfig):
             },
         )
         if "cameras" in tables:
-            config = replace(config, cameras=_cameras(tables["cameras"]))
+            config = replace(config, cameras=_read_cameras(tables["cameras"]))
         return config
 
     def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
-        """Return the configuration with further variants; one of a name that is there replaces it.
+        """Return the configuration with further variants, each in place of one of the same name.
 
-        A `ConfigError` if a name is taken by something else.
+        A `ConfigError` if something else has the name.
         """
         extra = {variant.name: variant for variant in (*self.extra, *variants)}
         return replace(self, extra=tuple(extra.values()))
 
     def with_tuned(self, names: Iterable[str]) -> RunConfig:
-        """Return the configuration with a variant for each named method that is tuned to a drive.
+        """Return the configuration with a tuned variant of each named method.
 
         A `ConfigError` if there is no such method, or it learns itself; see `tuned_variant`.
         """
-        made = {
-            variant.name: variant.pipeline for variant in variants_of(self.pipeline, self.extra)
-        }
+        pipelines = {v.name: v.pipeline for v in variants_of(self.pipeline, self.extra)}
         masks = {*self.topics.masks, *self.masks}
         variants = []
         for name in names:
-            if name not in made and name not in masks:
-                known = either({*made, *masks} - {FILTERED, UNFILTERED})
-                raise ConfigError(f"`tunes` {name}: there is no such method; choose {known}")
-            variants.append(tuned_variant(name, made.get(name)))
+            if name not in pipelines and name not in masks:
+                remedy = f"choose {list_names({*pipelines, *masks} - {FILTERED, UNFILTERED})}"
+                raise ConfigError(f"there is no method {name}", setting="tunes", remedy=remedy)
+            variants.append(tuned_variant(name, pipelines.get(name)))
         return self.with_variants(variants)
 
-    def given(self) -> set[str]:
-        """Return the names of the masks that the variants see."""
-        used = (each.settings.get("given") for each in self.pipelines().values())
-        return {own.name for own in used if own is not None}
+    def input_masks(self) -> set[str]:
+        """Return the names of the masks that the variants use as input."""
+        settings = (pipeline.settings.get("given") for pipeline in self.pipelines().values())
+        return {given.name for given in settings if given is not None}
 
     def for_training(self) -> RunConfig:
-        """Return the configuration with the masks alone that variants learn from."""
-        masks = {name: own for name, own in self.masks.items() if name in self.given()}
+        """Return the configuration with only those masks from which variants learn."""
+        masks = {name: masks for name, masks in self.masks.items() if name in self.input_masks()}
         return replace(self, masks=masks, only=())
 
     def of_drive(self, tables: Mapping[str, Any]) -> RunConfig:
-        """Return the configuration with the tables of `OF_A_LOG` that hold for one drive.
+        """Return the configuration with the tables of `OF_A_LOG` of one drive.
 
-        Labels replace the run's as a whole, the others key by key. A `ConfigError` for a table that
-        holds for the whole run, or a value that cannot be used.
+        Its labels replace those of the run, the other tables replace single keys. A `ConfigError`
+        for a table that is the same for all drives, or a value that cannot be used.
         """
         check_tables(tables, OF_A_LOG)
         labels = LabelSettings() if "labels" in tables else self.labels
@@ -270,45 +263,42 @@ class RunConfig(LogConfig):
 
     def for_drive(self, path: str | os.PathLike[str]) -> RunConfig:
         """Return the configuration with the drive's name in the paths of masks and truth."""
-        for own, each in self.masks.items():
-            if not each.path:
-                raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
-        only = {*self.masks, *self.topics.masks}
+        for name, masks in self.masks.items():
+            if not masks.path:
+                raise ConfigError(f"[masks.{name}] has no path: a folder, or LOG.mcap:/topic")
+        used = {*self.masks, *self.topics.masks}
         if self.only:
-            only &= {*self.only, *self.given()}
-        masks = {own: in_drive(each, path) for own, each in self.masks.items() if own in only}
-        topics = {own: topic for own, topic in self.topics.masks.items() if own in only}
+            used &= {*self.only, *self.input_masks()}
+        topics = {name: topic for name, topic in self.topics.masks.items() if name in used}
         return replace(
             self,
-            masks=masks,
+            masks={name: in_drive(self.masks[name], path) for name in self.masks if name in used},
             topics=replace(self.topics, masks=topics),
             truth=in_drive(self.truth, path),
         )
 
-    def ignored(self) -> tuple[str, ...]:
-        """Return a note for each setting of a variant's preset that the run does not follow."""
+    def ignored_settings(self) -> tuple[str, ...]:
+        """Return a note on each setting of a variant's preset that the run does not follow."""
         return tuple(
             f"{variant.name}: preset {variant.preset} asks for {section}.{key} = {value}, but all "
-            f"variants of a run are trained and scored alike ({getattr(own, key)})"
+            f"variants of a run are trained and scored alike ({getattr(settings, key)})"
             for variant in self.extra
             for section in SECTIONS
             for key, value in PRESETS[variant.preset].get(section, {}).items()
-            if getattr(own := getattr(self, section), key) != value
+            if getattr(settings := getattr(self, section), key) != value
         )
 
     def as_dict(self) -> dict[str, Any]:
         """Return every effective setting as plain data, in the shape of a TOML file.
 
-        A setting that is None has no value in such a file, and is left out there.
+        A file leaves out settings that are None.
         """
-        masks = {name: dataclasses.asdict(own) for name, own in self.masks.items()}
+        masks = {name: dataclasses.asdict(masks) for name, masks in self.masks.items()}
         return {
             "preset": self.preset,
             **({"only": list(self.only)} if self.only else {}),
             **self.pipeline.as_dict(),
-            "variants": {
-                each.name: {"preset": each.preset, **each.pipeline.as_dict()} for each in self.extra
-            },
+            "variants": {v.name: {"preset": v.preset, **v.pipeline.as_dict()} for v in self.extra},
             **({"masks": masks} if masks else {}),
             **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
             **({"cameras": [*map(dataclasses.asdict, self.cameras)]} if self.cameras else {}),
@@ -317,20 +307,22 @@ class RunConfig(LogConfig):
     def _with_variants(self, tables: Any) -> tuple[Variant, ...]:
         if not isinstance(tables, Mapping):
             raise ConfigError("[variants] must hold a table for each variant")
-        for name, own in tables.items():
-            if not isinstance(own, Mapping):
+        variants = []
+        for name, table in tables.items():
+            if not isinstance(table, Mapping):
                 raise ConfigError(f"[variants.{name}] must be a table")
-        made = [Variant.of(name, own, f"[variants.{name}]") for name, own in tables.items()]
-        return self.with_variants(made).extra
+            variants.append(Variant.of(name, table, f"[variants.{name}]"))
+        return self.with_variants(variants).extra
 
 
-def _cameras(entries: Any) -> tuple[CameraSettings, ...]:
-    """Read ``[[cameras]]``, the topics of each; a `ConfigError` if one cannot be used."""
-    if not isinstance(entries, list | tuple) or not all(isinstance(e, Mapping) for e in entries):
+def _read_cameras(tables: Any) -> tuple[CameraSettings, ...]:
+    """Return the settings of ``[[cameras]]``; a `ConfigError` if one cannot be used."""
+    if not isinstance(tables, list | tuple) or not all(isinstance(t, Mapping) for t in tables):
         raise ConfigError("cameras must be tables, each under [[cameras]]")
-    if missing := [each for each in entries if not each.get("image")]:
-        raise ConfigError(f"[[cameras]] {missing[0].get('name', '')}: image must name its topic")
-    return tuple(override(CameraSettings(each["image"]), each, "cameras") for each in entries)
+    for table in tables:
+        if not table.get("image"):
+            raise ConfigError(f"[[cameras]] {table.get('name', '')}: image must name its topic")
+    return tuple(override(CameraSettings(table["image"]), table, "cameras") for table in tables)
 
 
 def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> RunConfig:
@@ -339,12 +331,13 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
     Parameters
     ----------
     tables
-        In the shape of a TOML file; ``preset`` names what they start from, ``paper`` by default.
+        Tables in the shape of a TOML file. Their ``preset``, by default ``paper``, gives all other
+        values.
 
     Raises
     ------
     ConfigError
-        For a key or a value that cannot be used; names it, and what is allowed.
+        If a key or a value cannot be used. The message states what is allowed.
 
     Examples
     --------
@@ -362,42 +355,43 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
 def load_config(path: str | Path, *, trusted: bool = True) -> RunConfig:
     """Read the configuration of a run from a TOML file.
 
-    A `ConfigError` if the file is missing, no TOML, or holds a key or a value that cannot be used.
+    A `ConfigError` if the file is missing, is no TOML, or has a key or a value that cannot be used.
 
     Parameters
     ----------
     path
         The file, in the shape that the top of this module describes.
     trusted
-        Whether the user has named the file. One that came with results, or in a recording, loads
+        Whether the user has named the file. A file that came with results, or in a recording, loads
         no code.
     """
     return configure(read_tables(path, trusted=trusted), where=str(path))
 
 
 WIDTH: Final = 100
+"""Letters of a line of comments."""
 _BOUNDS: Final = {
     "minimum": "at least {}",
     "exclusiveMinimum": "above {}",
     "maximum": "at most {}",
     "exclusiveMaximum": "below {}",
 }
-"""How a JSON schema's bounds are said."""
+"""The bounds of a JSON schema in words."""
 
 
 def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay") -> str:
-    """Write the TOML file that repeats a run, with every effective setting."""
+    """Return the TOML file that repeats a run, with every effective setting."""
     head = (
         f"# The configuration of a {command} of {visible(drive)} by roadeval {version}.\n"
         f"# To repeat the run, give this file to roadeval {command} as its configuration."
     )
-    lines = [each for each in config_toml(config).splitlines() if each and each[0] != "#"]
-    text = "\n".join(f"\n{each}" if each[0] == "[" else each for each in lines)
+    lines = [line for line in config_toml(config).splitlines() if line and line[0] != "#"]
+    text = "\n".join(f"\n{line}" if line[0] == "[" else line for line in lines)
     return visible_lines(f"{head}\n{text}\n")
 
 
 def _without_none(value: Any) -> Any:
-    """Return plain data for TOML: without settings that are None, and with lists."""
+    """Return plain data for TOML: without settings that are None, and with lists for tuples."""
     if isinstance(value, Mapping):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
     return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
@@ -424,48 +418,48 @@ def config_toml(config: RunConfig | None = None) -> str:
     import tomlkit
 
     config = config or RunConfig()
-
-    head = [f"preset = {tomlkit.item(config.preset).as_string()}", *_chain(config.pipeline)]
+    head = [_assignment("preset", config.preset), *_chain_lines(config.pipeline)]
     if config.only:
         head += [*_comment("The variants that run."), _assignment("only", config.only)]
-    parts = ["\n".join(head), *_stages(config.pipeline, "")]
+    parts = ["\n".join(head), *_stage_tables(config.pipeline, "")]
     for variant in config.extra:
-        named = tomlkit.item(variant.preset).as_string()
-        parts.append(f"[variants.{variant.name}]\npreset = {named}")
-        parts[-1] += "\n" + "\n".join(_chain(variant.pipeline))
-        parts += _stages(variant.pipeline, f"variants.{variant.name}.")
-    parts += [_table(f"masks.{name}", own) for name, own in config.masks.items()]
+        head = [f"[variants.{variant.name}]", _assignment("preset", variant.preset)]
+        parts.append("\n".join([*head, *_chain_lines(variant.pipeline)]))
+        parts += _stage_tables(variant.pipeline, f"variants.{variant.name}.")
+    parts += [_table(f"masks.{name}", masks) for name, masks in config.masks.items()]
     parts += [_table(name, getattr(config, name)) for name in SECTIONS]
-    cameras = [_without_none(dataclasses.asdict(each)) for each in config.cameras]
-    parts += [tomlkit.dumps({"cameras": [each]}).strip() for each in cameras]
+    for camera in config.cameras:
+        table = _without_none(dataclasses.asdict(camera))
+        parts.append(tomlkit.dumps({"cameras": [table]}).strip())
     return "\n\n".join(parts) + "\n"
 
 
-def _chain(pipeline: Pipeline) -> Iterator[str]:
-    yield from _comment(f"The stages in the order they run; there are {', '.join(stages.names())}.")
-    yield f"chain = [{', '.join(f'{name!r}' for name in pipeline.chain)}]".replace("'", '"')
+def _chain_lines(pipeline: Pipeline) -> list[str]:
+    names = ", ".join(stages.names())
+    comment = _comment(f"The stages in the order in which they run; there are {names}.")
+    return [*comment, _assignment("chain", pipeline.chain)]
 
 
-def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
-    return [_table(f"{prefix}{name}", own) for name, own in pipeline.settings.items()]
+def _stage_tables(pipeline: Pipeline, prefix: str) -> list[str]:
+    return [_table(f"{prefix}{name}", settings) for name, settings in pipeline.settings.items()]
 
 
 def _table(name: str, settings: Any) -> str:
-    """Write the table of a settings dataclass; dataclasses in it follow as tables."""
+    """Return the table of a settings dataclass, and the tables of dataclasses in it."""
     title, comments = _comments(settings.__class__)
     lines, inner = [*title, f"[{name}]"], []
-    for each in dataclasses.fields(settings):
-        value = getattr(settings, each.name)
+    for key, comment in comments.items():
+        value = getattr(settings, key)
         if dataclasses.is_dataclass(value):
-            inner.append(_table(f"{name}.{each.name}", value))
-            continue
-        lines += ["", *comments[each.name], _assignment(each.name, value)]
+            inner.append(_table(f"{name}.{key}", value))
+        else:
+            lines += ["", *comment, _assignment(key, value)]
     return "\n\n".join(["\n".join(lines), *inner])
 
 
 @cache
 def _comments(kind: type) -> tuple[list[str], dict[str, list[str]]]:
-    """Return the comments of a settings dataclass, and of each setting: meaning and range."""
+    """Return the comment on a settings dataclass, and on each setting with its range."""
     texts, title = meanings(kind), (inspect.getdoc(kind) or "").partition("\n\n")[0]
     return _comment(title), {
         name: _comment(" ".join(filter(None, (texts.get(name), _allowed(schema)))))
@@ -491,11 +485,11 @@ def _comment(text: str) -> list[str]:
 
 
 def _allowed(schema: Mapping[str, Any]) -> str:
-    """Describe the allowed values of a setting by its JSON schema; empty where all are allowed."""
-    for each in (schema, *schema.get("anyOf", ())):
-        if "enum" in each:
-            return f"One of {', '.join(map(str, each['enum']))}."
-        bounds = [text.format(each[name]) for name, text in _BOUNDS.items() if name in each]
+    """Describe the values that a JSON schema allows; empty if it allows all."""
+    for kind in (schema, *schema.get("anyOf", ())):
+        if "enum" in kind:
+            return f"One of {', '.join(map(str, kind['enum']))}."
+        bounds = [text.format(kind[name]) for name, text in _BOUNDS.items() if name in kind]
         if bounds:
             return f"{', '.join(bounds).capitalize()}."
     return ""

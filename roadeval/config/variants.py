@@ -1,4 +1,4 @@
-"""Variants, which are named methods that run side by side, and the presets that they start from.
+"""Variants, which are named methods that run side by side, and presets of their settings.
 
 A variant is a pipeline, a network, or the masks of another method.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from roadeval.config.settings import SECTIONS
-from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
+from roadeval.config.tables import ConfigError, in_file, list_names, override, read_tables
 from roadeval.data import (
     ERRORS,
     FILTERED,
@@ -26,6 +26,8 @@ from roadeval.data import (
 from roadeval.logs.settings import LabelPlace, MaskSettings
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.stage import Stage
+from roadeval.runtime.sentence import Sentence
 
 PAPER_CHAIN: Final = ("shadow", "similarity", "svm", "post")
 
@@ -51,21 +53,21 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "post": {"region": "all"},
     },
 }
-"""By name, each in the shape of a TOML file (see `roadeval.config.run`).
+"""Presets by name, each in the shape of a TOML file (see `roadeval.config.run`).
 
-``printed_order`` and ``hsi`` are ``paper`` with one thing as the text has it: the order of
-post-processing (section 4.4), and the colour space of the compensation (section 4.2, step 5). They
-show beside it, as variants, what that thing does.
+``printed_order`` and ``hsi`` are ``paper`` with one detail as the text has it: the order of
+post-processing (section 4.4), and the colour space of the compensation (section 4.2, step 5). As
+variants beside ``paper`` they show the effect of that detail.
 
 In ``gated`` exposure comes before the filter, which is then better on four of five drives. The
-variant ``unfiltered`` shows what exposure alone does.
+variant ``unfiltered`` shows the effect of exposure alone.
 
-``robust`` keeps every region of its mask: vehicles cut a road in pieces.
+``robust`` keeps every region of its mask, as vehicles divide a road into pieces.
 """
 LONGEST: Final = 64
-"""Letters of a variant's name: it is printed in the columns of tables."""
+"""Letters of a variant's name, which is printed in the columns of tables."""
 DRIVE: Final = "{drive}"
-"""The placeholder of the drive's name in a path of masks."""
+"""The placeholder of the drive's name in the path of labels."""
 AS_IT_IS: Final[Mapping[str, Any]] = {"operations": (), "region": "all", "fill": False}
 """Settings of phase 4 that leave a mask as it is."""
 
@@ -76,38 +78,36 @@ Masks = Mapping[str, MaskSettings]
 
 @dataclass(frozen=True)
 class Variant:
-    """A named method: its pipeline, and the preset that it started from."""
+    """A named method: its pipeline, and the preset to which its settings are changes."""
 
     name: str
     pipeline: Pipeline
     preset: str = "paper"
     of_pair: bool = False
-    """Whether it is a pipeline whose filter was taken out, beside the one that has it."""
+    """Whether it is the pipeline of a run without its filter, beside the one with it."""
 
     @classmethod
     def of(cls, name: str, tables: Mapping[str, Any], where: str = "") -> Variant:
         """Make a variant from tables in the shape of a TOML file: ``preset``, ``chain``, stages.
 
-        A `ConfigError` for a key or a value that cannot be used; ``where`` begins its message.
+        A `ConfigError`, which names the place ``where``, for a key or a value that cannot be used.
         """
         with in_file(where):
             preset = preset_of(tables)
-            rest = {key: value for key, value in tables.items() if key != "preset"}
+            tables = {key: value for key, value in tables.items() if key != "preset"}
             for section in SECTIONS:
-                if section in rest:
-                    raise ConfigError(
-                        f"[{section}] holds for the whole run: it belongs in the configuration of "
-                        "the run"
-                    )
-            pipeline = pipeline_of(pipeline_of(None, PRESETS[preset]), rest)
-            check_tables(rest, ("chain", *pipeline.settings))
+                if section in tables:
+                    problem = f"[{section}] applies to all variants"
+                    raise ConfigError(problem, remedy="set it in the run's configuration")
+            pipeline = pipeline_of(pipeline_of(None, PRESETS[preset]), tables)
+            check_tables(tables, ("chain", *pipeline.settings))
         return cls(name, pipeline, preset)
 
     def layout(self) -> VariantLayout:
-        """Return the layout of the variant, which recording and tables need beforehand."""
-        found = self.pipeline.stages()
-        title = ", ".join(stage.title for stage in found if stage.name != FINAL_STAGE)
-        if any(stage.is_filter for stage in found):
+        """Return the layout, which recording and tables need before the first frame."""
+        stages_ = self.pipeline.stages()
+        title = ", ".join(stage.title for stage in stages_ if stage.name != FINAL_STAGE)
+        if any(stage.is_filter for stage in stages_):
             title = "with the filter"
         elif self.of_pair:
             title = "without the filter"
@@ -115,132 +115,135 @@ class Variant:
 
 
 def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, ...]:
-    """Return a run's variants: with the pipeline's filters, without them, and the extra ones.
+    """Return the variants of a run: with the pipeline's filters, without them, and the extra ones.
 
-    A pipeline without a filter gives the unfiltered variant alone. A `ConfigError` if an extra
-    variant's name is taken, reserved, or no plain word.
+    A pipeline without a filter gives the unfiltered variant alone. A `ConfigError` if the name of
+    an extra variant is taken, reserved, or no plain word.
     """
     unfiltered = pipeline.without_filter()
-    pair = unfiltered != pipeline
-    variants = [Variant(FILTERED, pipeline)] if pair else []
-    variants.append(Variant(UNFILTERED, unfiltered, of_pair=pair))
+    has_filter = unfiltered != pipeline
+    variants = [Variant(FILTERED, pipeline)] if has_filter else []
+    variants.append(Variant(UNFILTERED, unfiltered, of_pair=has_filter))
     for variant in extra:
-        check_variant_name(variant.name, {v.name for v in variants})
+        check_variant_name(variant.name, {other.name for other in variants})
         variants.append(variant)
     return tuple(variants)
 
 
 def preset_of(tables: Mapping[str, Any]) -> str:
-    """Return the name of the preset that tables start from; a `ConfigError` if there is none."""
+    """Return the name of the preset of some tables; a `ConfigError` if there is no such preset."""
     name = tables.get("preset", "paper")
     if not isinstance(name, str) or name not in PRESETS:
-        raise ConfigError(f"preset: there is no {name!r}; choose {either(PRESETS)}")
+        remedy = f"choose {list_names(PRESETS)}"
+        raise ConfigError(f"there is no {name!r}", where="preset", remedy=remedy)
     return name
 
 
-def check_tables(tables: Mapping[str, Any], known: Collection[str]) -> None:
-    """Raise a `ConfigError` for a table or key at the top that is not known."""
-    for key in tables:
-        if key not in known:
-            names = either(name for name in known if name != "chain")
-            if isinstance(tables[key], Mapping):
-                raise ConfigError(f"[{key}] is no table here; choose {names}")
-            raise ConfigError(f"{key} is in no table; put it below one of {names}")
+def check_tables(tables: Mapping[str, Any], allowed: Collection[str]) -> None:
+    """Raise a `ConfigError` for a table, or a key outside of tables, that is not allowed."""
+    names = list_names(name for name in allowed if name != "chain")
+    for key, table in tables.items():
+        if key in allowed:
+            continue
+        if isinstance(table, Mapping):
+            raise ConfigError(f"[{key}] is no table here", remedy=f"choose {names}")
+        raise ConfigError(f"{key} is in no table", remedy=f"put it below one of {names}")
 
 
 def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
-    """Override a pipeline's chain and its stages' settings by tables in the shape of a TOML file.
+    """Return a pipeline with the chain and the settings of tables in the shape of a TOML file.
 
     A `ConfigError` for a chain that cannot run, or a setting that cannot be used.
     """
-    chain = _chain(tables.get("chain", base.chain if base else ()))
-    current = {} if base is None else base.settings
+    chain = tables.get("chain", base.chain if base else ())
+    defaults = {} if base is None else base.settings
     settings = {
-        each.name: override(
-            current.get(each.name) or each.settings(), tables.get(each.name, {}), each.name
+        stage.name: override(
+            defaults.get(stage.name) or stage.settings(), tables.get(stage.name, {}), stage.name
         )
-        for each in stages.stages_of(chain)
+        for stage in _stages_of(chain)
     }
-    pipeline = Pipeline(chain, settings)
-    for stage in pipeline.heard():
+    pipeline = Pipeline(tuple(chain), settings)
+    for stage in pipeline.heard_stages():
         if stage.fit is not None:
-            raise ConfigError(f"chain: {stage.name} learns, so no later stage can learn from it")
+            problem = f"{stage.name} is trained; a later stage cannot train on its output"
+            raise ConfigError(problem, where="chain")
     layers = [spec.name for spec in (*pipeline.layers(), ERRORS)]
     for name in layers:
         if layers.count(name) > 1:
-            raise ConfigError(f"chain: two layers are called {name}")
+            raise ConfigError(f"two layers are called {name}", where="chain")
     return pipeline
 
 
-def _chain(names: Any) -> tuple[str, ...]:
-    """Check a chain: known stages, each once, and the final one last."""
-    if not isinstance(names, list | tuple) or not names:
-        raise ConfigError(f"chain must be a list of stages; choose {either(stages.names())}")
-    for name in names:
+def _stages_of(chain: Any) -> tuple[Stage, ...]:
+    """Return the stages of a chain; a `ConfigError` if they do not make one."""
+    choice = f"choose {list_names(stages.names())}"
+    if not isinstance(chain, list | tuple) or not chain:
+        raise ConfigError("chain must be a list of stages", remedy=choice)
+    for name in chain:
         if not isinstance(name, str):
-            choice = either(stages.names())
-            raise ConfigError(f"chain: there is no stage {name!r}; choose {choice}")
+            raise ConfigError(f"there is no stage {name!r}", where="chain", remedy=choice)
     try:
-        found = stages.stages_of(names)
+        found = stages.stages_of(chain)
     except stages.UnknownStageError as error:
-        raise ConfigError(f"chain: {error}") from error
+        raise ConfigError.of(error, "chain") from error
     if len({stage.name for stage in found}) < len(found):
-        raise ConfigError("chain: a stage can occur only once")
-    if names[-1] != FINAL_STAGE:
+        raise ConfigError("a stage can occur only once", where="chain")
+    if chain[-1] != FINAL_STAGE:
         raise ConfigError(f"chain must end with {FINAL_STAGE}, whose mask is the answer")
-    return tuple(names)
+    return tuple(found)
 
 
 def check_variant_name(name: str, taken: Collection[str]) -> None:
     """Raise a `ConfigError` for a variant's name that results cannot hold, or that is taken.
 
-    A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves
-    names that begin with ``_`` out of a legend.
+    A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves a name
+    that begins with ``_`` out of a legend.
     """
+    where = f"variant {name!r}" if len(name) <= LONGEST else f"variant {name[:LONGEST] + '...'!r}"
     if not is_plain(name) or name[0] in "-_" or len(name) > LONGEST:
-        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
         raise ConfigError(
-            f"variant {shown!r}: a name is made of letters, digits, '-' and '_' alone, begins with "
-            f"a letter or a digit, and has at most {LONGEST} of them"
+            "a name is made of letters, digits, '-' and '_' alone, begins with a letter or a "
+            f"digit, and has at most {LONGEST} of them",
+            where=where,
         )
     if name in RESERVED:
-        raise ConfigError(f"variant {name!r}: the name is reserved ({either(RESERVED)})")
+        raise ConfigError(f"the name is reserved ({list_names(RESERVED)})", where=where)
     if name in taken:
-        raise ConfigError(f"variant {name!r}: the name is taken; choose another")
+        raise ConfigError("the name is taken", where=where, remedy="choose another")
 
 
 def network_variant(name: str, path: str) -> Variant:
-    """Return the variant of a network: its mask, which phase 4 leaves as it is.
+    """Return the variant of a network, whose mask phase 4 leaves as it is.
 
-    A `ConfigError` if a TOML file cannot be used. The network itself is opened when it is run.
-    ``path`` is an ONNX file, or a TOML file with the settings of the stage ``net``, whose ``file``
-    is found from the folder of the TOML file. Its table ``[post]`` asks for post-processing.
+    ``path`` is an ONNX file, or a TOML file with the settings of the stage ``net``, in which
+    ``file`` is relative to the folder of the TOML file, and ``[post]`` asks for post-processing.
+    The network itself is opened when it is run. A `ConfigError` if a TOML file cannot be used.
     """
-    tables: Mapping[str, Any] = {"file": path}
-    if in_a_file := Path(path).suffix == ".toml":
-        tables = read_tables(path)
-    settings = {key: value for key, value in tables.items() if key != "post"}
-    is_trained = settings.get("decide") == TRAINED
-    if is_trained:
+    settings: dict[str, Any] = {"file": path}
+    if is_toml := Path(path).suffix == ".toml":
+        settings = read_tables(path)
+    post = settings.pop("post", {})
+    chain = ["net", FINAL_STAGE]
+    if settings.get("decide") == TRAINED:
         if "threshold" in settings:
-            raise ConfigError(f'{path}: threshold says nothing where decide = "{TRAINED}"')
+            raise ConfigError(f'threshold has no effect if decide = "{TRAINED}"', where=path)
         del settings["decide"]
-    file, post = settings.get("file"), tables.get("post", {})
-    if not isinstance(file, str) or not file:
-        raise ConfigError(f"{path}: file must name the network, an ONNX file")
+        chain.insert(1, "threshold")
+    if not isinstance(file := settings.get("file"), str) or not file:
+        raise ConfigError("file must name the network, an ONNX file", where=path)
     if not isinstance(post, Mapping):
-        raise ConfigError(f"{path}: [post] must be a table")
-    if in_a_file:
+        raise ConfigError("[post] must be a table", where=path)
+    if is_toml:
         settings["file"] = str(Path(path).parent / file)
-    stages_ = ("net", *(("threshold",) if is_trained else ()), FINAL_STAGE)
-    chain = {"chain": stages_, "net": settings, "post": {**AS_IT_IS, **post}}
-    return Variant.of(name, chain, path if in_a_file else "")
+    tables = {"chain": chain, "net": settings, "post": {**AS_IT_IS, **post}}
+    return Variant.of(name, tables, path if is_toml else "")
 
 
-def thresholded(name: str) -> Variant:
-    """Return the variant of another method's confidences, above the training frames' threshold."""
-    chain = {"chain": ("given", "threshold", FINAL_STAGE), "given": {"name": name}}
-    return Variant.of(name, {**chain, "post": AS_IT_IS})
+def thresholded_variant(name: str) -> Variant:
+    """Return the variant of a method's confidences, with the training frames' threshold."""
+    chain = ("given", "threshold", FINAL_STAGE)
+    return Variant.of(name, {"chain": chain, "given": {"name": name}, "post": AS_IT_IS})
 
 
 TRAINED: Final = "trained"
@@ -248,47 +251,48 @@ TRAINED: Final = "trained"
 
 
 def tuned_variant(name: str, method: Pipeline | None) -> Variant:
-    """Return the variant that corrects a method by what training frames teach.
+    """Return the variant that learns to correct a method.
 
-    It is the preset ``robust`` with what the method says of a pixel among the features of its
-    trees. ``method`` is None for one whose masks another system has made. A `ConfigError` if the
-    method learns, for of frames that taught it, it would say too much.
+    It is the preset ``robust``, in which the method's output is a feature of the trees. ``method``
+    is None if another system has made its masks. A `ConfigError` if the method is trained itself,
+    as its output on its training frames is over-confident.
     """
     before: tuple[str, ...] = ("given",)
     settings = {"given": {"name": name}}
     if method is not None:
-        if learning := [name for name in method.learning() if name != "threshold"]:
+        if learning := [stage for stage in method.learning_stages() if stage != "threshold"]:
             raise ConfigError(
-                f"`tunes` {name}: it learns itself ({', '.join(learning)}), and of frames that "
-                "taught it, it says too much to learn from"
+                f"{name} is trained itself ({', '.join(learning)}), so its output on its training "
+                "frames is over-confident",
+                setting="tunes",
             )
         dropped = ("threshold", FINAL_STAGE)
-        before = tuple(each for each in method.chain if each not in dropped)
-        settings = {k: asdict(own) for k, own in method.settings.items() if k not in dropped}
+        before = tuple(stage for stage in method.chain if stage not in dropped)
+        settings = {s: asdict(own) for s, own in method.settings.items() if s not in dropped}
     exposure = () if "exposure" in before else ("exposure",)
     chain = (*before, *exposure, "trees", FINAL_STAGE)
     tables = {"preset": "robust", "chain": chain, **settings, "trees": {"opinion": True}}
-    return Variant.of(f"{name}{TUNED}", tables, f"`tunes` {name}")
+    return Variant.of(f"{name}{TUNED}", tables, Sentence("{tunes} {}", name))
 
 
 def with_masks(current: Masks, tables: Any) -> Masks:
-    """Return settings of masks with those of further tables: key by key where the name is there.
+    """Return the settings of masks, changed by tables of further settings by name.
 
     A `ConfigError` for a key or a value that cannot be used.
     """
     if not isinstance(tables, Mapping):
         raise ConfigError("[masks] must hold a table for each variant")
-    return {
-        **current,
-        **{
-            name: override(current.get(name, MaskSettings()), own, f"masks.{name}")
-            for name, own in tables.items()
-        },
-    }
+    masks = dict(current)
+    for name, table in tables.items():
+        masks[name] = override(masks.get(name, MaskSettings()), table, f"masks.{name}")
+    return masks
 
 
 def in_drive(place: Place, drive: str | os.PathLike[str]) -> Place:
-    """Return where labels lie, with the drive's name in their paths: its file's, without ending."""
+    """Return the place of labels with the drive's name in its paths.
+
+    That is the name of the drive's folder, or of its file without the ending.
+    """
     path = Path(drive)
     name = path.name if path.is_dir() else path.stem
     images = place.images and place.images.replace(DRIVE, name)

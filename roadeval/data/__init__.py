@@ -23,7 +23,6 @@ from roadeval.data.frame import (
 from roadeval.data.histogram import CERTAIN, CODES, best_code, histogram, wrong_above
 from roadeval.data.layer import (
     ERRORS,
-    ROAD_CLASSES,
     TRUTH,
     LabelClass,
     Layer,
@@ -33,7 +32,6 @@ from roadeval.data.layer import (
 )
 from roadeval.data.result import (
     BASELINE,
-    CAMERA,
     FILTERED,
     FINAL_STAGE,
     OUTCOMES,

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from roadeval.runtime.sentence import Sentence
+
 FISHEYE: Final = ("equidistant", "fisheye", "kannala_brandt")
 """Models with a distance from the centre that grows with the angle of a ray, not with its slope."""
 
@@ -77,7 +79,8 @@ class Calibration:
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""
         middle = f"the middle of {self.width}x{self.height} pixels"
-        return f"its centre, {x:.4g}, {y:.4g}, is far from {middle}: correct it with `ground`"
+        far = "its centre, {}, {}, is far from {}: correct it with {ground}"
+        return Sentence(far, f"{x:.4g}", f"{y:.4g}", middle)
 
     @property
     def bends(self) -> bool:

@@ -33,7 +33,7 @@ def group_rows(table: pd.DataFrame, by: Sequence[str]) -> Any:
     return table.groupby([*by], sort=False, observed=True)
 
 
-def joined(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+def concatenate(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     """Concatenate tables; a column is a categorical if it is one in any of them."""
     import pandas as pd
     from pandas.api.types import union_categoricals

@@ -1,7 +1,7 @@
-"""Worker processes that replay the drives: of Dask, on this machine or of a cluster.
+"""Dask's worker processes, on this machine or on a cluster, which replay the drives.
 
-All other code sees a `concurrent.futures.Executor`, and may use another one. Python's own do not
-survive the death of a worker; Dask's does, and starts the task again on another worker.
+All other code uses a `concurrent.futures.Executor`, and may use another one. The executors of
+Python do not survive the death of a worker. That of Dask starts the task again on another worker.
 """
 
 from __future__ import annotations
@@ -14,23 +14,24 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 from roadeval.fleet.drives import FleetError
+from roadeval.runtime.sentence import Sentence
 
 ATTEMPTS: Final = 2
-"""Attempts at a drive whose worker dies; on a cluster the scheduler's settings decide."""
+"""Attempts at a drive whose worker dies; on a cluster the settings of the scheduler decide."""
 ANSWER_S: Final = 15
-"""Limit of a scheduler's answer."""
+"""Seconds in which a scheduler must answer."""
 _LOCAL: Final = {
     "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
     # No drive waits for a busy worker while another one is idle.
     "distributed.scheduler.worker-saturation": 1.0,
-    # A worker with too much memory is ended: it holds no results that could be written to a disk,
-    # and a paused one would wait for ever.
+    # A worker that uses too much memory is ended: it has no results that it could write to a disk,
+    # and a paused worker would wait for ever.
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    # Without Dask's own MALLOC_TRIM_THRESHOLD_: with it every image is mapped and cleared again,
-    # and a drive takes twice as long.
+    # Dask's own MALLOC_TRIM_THRESHOLD_ is left out: with it every image is mapped and cleared
+    # again, and a drive takes twice as long.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(
         ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
     ),
@@ -38,45 +39,50 @@ _LOCAL: Final = {
 
 
 @contextmanager
-def started(
+def start_workers(
     workers: int | None = None, scheduler: str | None = None
 ) -> Iterator[tuple[Executor, int]]:
-    """Start worker processes here, or connect to a scheduler; yield who does tasks, and how many.
+    """Start worker processes, or connect to a scheduler; yield an executor and its workers' number.
 
     At the end of the block tasks that still run are cancelled, and workers that were started here
-    end. A `FleetError` if the scheduler does not answer. There are ``workers`` processes here, one
-    a processor by default. One that takes more than its share of the machine's memory is ended,
-    which costs its drive one attempt. ``scheduler`` is the address of a Dask scheduler,
-    ``tcp://host:8786``, or the file that it has written.
+    end. A `FleetError` if the scheduler does not answer.
+
+    Parameters
+    ----------
+    workers
+        The number of processes that are started, by default one per processor. A process that takes
+        more than its share of the machine's memory is ended, which costs its drive one attempt.
+    scheduler
+        The address of a Dask scheduler, as ``tcp://host:8786``, or the file that it has written.
     """
     import dask.system
     import distributed
 
     with ExitStack() as stack:
         if scheduler is None:
-            # A worker receives this process's own path only after it has imported some modules:
-            # until then it shall import nothing from the current folder.
+            # A worker gets the path of this process only after it has imported some modules. Until
+            # then it must not import anything from the current folder.
             if not os.environ.get("PYTHONSAFEPATH"):
                 os.environ["PYTHONSAFEPATH"] = "1"
                 stack.callback(os.environ.pop, "PYTHONSAFEPATH", None)
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or dask.system.CPU_COUNT
-            client = stack.enter_context(_local(distributed, count))
+            client = stack.enter_context(_start_cluster(distributed, count))
         else:
-            client = stack.enter_context(_connected(distributed, scheduler))
+            client = stack.enter_context(_connect(distributed, scheduler))
             count = len(client.scheduler_info(n_workers=-1)["workers"])
         executor = client.get_executor(pure=False)
         stack.callback(executor.shutdown, wait=False)
         yield executor, count
 
 
-def died(error: BaseException) -> bool:
+def is_worker_death(error: BaseException) -> bool:
     """Return whether an error means that the workers of a task have died."""
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
 
 
 @contextmanager
-def _local(distributed: Any, count: int) -> Iterator[Any]:
+def _start_cluster(distributed: Any, count: int) -> Iterator[Any]:
     with ExitStack() as stack:
         try:
             cluster = distributed.LocalCluster(
@@ -91,29 +97,33 @@ def _local(distributed: Any, count: int) -> Iterator[Any]:
             client = distributed.Client(stack.enter_context(cluster))
         except (OSError, RuntimeError) as error:
             raise FleetError(
-                f"the worker processes cannot be started ({error}): give them more memory, "
-                "processes or open files (see ulimit -a), or take fewer `run.jobs`"
+                f"the worker processes cannot be started ({error})",
+                remedy=Sentence(
+                    "give them more memory, processes or open files (see ulimit -a), or take fewer "
+                    "{run.jobs}"
+                ),
             ) from error
         yield stack.enter_context(client)
 
 
 @contextmanager
-def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
+def _connect(distributed: Any, scheduler: str) -> Iterator[Any]:
     # The library logs every attempt to connect.
-    log = logging.getLogger("distributed")
-    before = log.level
-    log.setLevel(logging.CRITICAL)
-    is_file = os.path.exists(scheduler)  # noqa: PTH110 - for what is an address it is False
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    is_file = os.path.exists(scheduler)  # noqa: PTH110 - an address may be no path
     try:
         try:
-            where = {"scheduler_file": scheduler} if is_file else {"address": scheduler}
-            client = distributed.Client(**where, timeout=ANSWER_S)
+            place = {"scheduler_file" if is_file else "address": scheduler}
+            client = distributed.Client(**place, timeout=ANSWER_S)
         except (OSError, TimeoutError, ValueError, TypeError) as error:
             raise FleetError(
-                f"`fleet.scheduler` {scheduler}: does not answer within {ANSWER_S} s, or is no "
-                "Dask scheduler; name it as tcp://host:8786, or by the file that it has written"
+                f"{scheduler} does not answer within {ANSWER_S} s, or is no Dask scheduler",
+                setting="fleet.scheduler",
+                remedy="name it as tcp://host:8786, or by the file that it has written",
             ) from error
         with client:
             yield client
     finally:
-        log.setLevel(before)
+        logger.setLevel(level)

@@ -1,12 +1,12 @@
-"""Drives in object stores and on web servers: read by parts, and checked for changes.
+"""Drives in object stores and on web servers, which are read in parts and checked for changes.
 
 obstore reads them. For ``s3://`` and ``gs://`` it takes credentials, endpoint and region from the
 environment, as ``AWS_ACCESS_KEY_ID``, ``AWS_ENDPOINT_URL``, ``AWS_ALLOW_HTTP`` for an endpoint
 without TLS, ``AWS_SKIP_SIGNATURE`` for a public bucket, ``GOOGLE_SERVICE_ACCOUNT``. Signed URLs
 and ``user:password@`` work for ``https://``. A stream that breaks is continued.
 
-fsspec, which Dask brings, reads none of these by itself. Its stores are a package and an SDK each,
-and do not continue a stream.
+fsspec, which Dask installs, reads none of these by itself. Each of its stores needs a package and
+an SDK, and does not continue a stream.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from roadeval.fleet.drives import (
     bucket_and_key,
     is_url,
     last_part,
+    public_source,
     scheme_of,
-    shown,
 )
 from roadeval.logs.log import RemoteLog
 from roadeval.runtime.threads import in_thread
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 
 PATIENCE_S: Final = 20.0
-"""How long a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
+"""Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
-_PART: Final = 64 << 10
-"""Least bytes of a part that is read: a chunk's message indexes, and the next one's head."""
-_PATIENCE_S: Final = 0.2
-"""Between two looks whether an answer has come."""
+PART: Final = 64 << 10
+"""Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
+_POLL_S: Final = 0.2
+"""Seconds between two checks for an answer."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
 CHANGED: Final = "it changed while it was read"
 SILENT: Final = "the server stopped answering"
@@ -64,24 +64,30 @@ _REASONS: Final = (
     (r"RangeNotSupported", NO_PARTS),
     (r"Content-Length", "the server does not state its length"),
 )
-"""Patterns of obstore's messages and errors, with their meaning; the first that is found counts."""
+"""Patterns of obstore's errors and messages, and their meaning; the first that matches counts."""
 
 
-def readable(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
-    """Return what `roadeval.logs.log.open_log` opens of a drive: a path, or the file behind a URL.
+def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
+    """Return the path of a drive, or the file behind its URL, for `roadeval.logs.log.open_log`.
 
-    Of it only the parts that are needed are read. A `FleetError` if the URL cannot be one, nothing
-    can be read there, or the server is silent for so many seconds.
+    Only the parts of the file that are needed are read. A `FleetError` if the URL is none, nothing
+    can be read there, or the server is silent for ``patience_s`` seconds.
     """
     source = os.fspath(drive)
     if not is_url(source):
         return Path(source)
-    name, place = Path(_file_name(source)), _place(source, patience_s)
-    file = cast("IO[bytes]", _Parts(place, _facts(place)))
-    return RemoteLog(shown(source), name, file)
+    name, place = Path(file_name(source)), _open_store(source, patience_s)
+    file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
+    return RemoteLog(public_source(source), name, file)
 
 
-class _Facts(NamedTuple):
+def file_name(url: str) -> str:
+    """Return the name in a URL, with ``_`` for letters that some system does not allow."""
+    name = re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|]', "_", last_part(url))
+    return name if name.strip(".") else "drive"
+
+
+class _FileState(NamedTuple):
     """The state of a file, which changes with its content."""
 
     size: int
@@ -93,20 +99,20 @@ class _Facts(NamedTuple):
         return cls(meta["size"], meta["e_tag"], meta["last_modified"])
 
     def differs(self, other: Self) -> bool:
-        """Return whether both state something, and not the same."""
-        # A server that compresses weakens a tag; one that states no time is given 1970.
+        """Return whether a size, tag or time that both state differs."""
+        # A server that compresses weakens a tag. If a server states no time, obstore returns 1970.
         one, two = ((tag or "").removeprefix("W/") for tag in (self.tag, other.tag))
         times = self.modified, other.modified
-        later = times[0] != times[1] and all(time.timestamp() > 0 for time in times)
-        return self.size != other.size or (one != two and "" not in (one, two)) or later
+        is_later = times[0] != times[1] and all(time.timestamp() > 0 for time in times)
+        return self.size != other.size or (one != two and "" not in (one, two)) or is_later
 
 
-class _Parts:
-    """A file elsewhere of which parts are read; a `FleetError` if it changes meanwhile."""
+class _RemoteFile:
+    """A file elsewhere that is read in parts; a `FleetError` if it changes meanwhile."""
 
-    def __init__(self, place: _Place, facts: _Facts) -> None:
-        self._place, self._facts, self._size, self._at = place, facts, facts.size, 0
-        tag = facts.tag
+    def __init__(self, place: _Place, state: _FileState) -> None:
+        self._place, self._state, self._size, self._at = place, state, state.size, 0
+        tag = state.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
         self._begin, self._part = 0, b""
 
@@ -117,7 +123,7 @@ class _Parts:
     def read(self, size: int) -> bytes:
         begin, end = self._at, min(self._at + size, self._size)
         if not self._begin <= begin <= end <= self._begin + len(self._part):
-            self._part = self._fetch(begin, min(max(end, begin + _PART), self._size))
+            self._part = self._fetch(begin, min(max(end, begin + PART), self._size))
             self._begin = begin
         self._at = max(begin, end)
         return self._part[begin - self._begin : self._at - self._begin]
@@ -129,27 +135,28 @@ class _Parts:
             return b""
         options = {"range": (begin, end), **self._options}
 
-        def part() -> tuple[_Facts, bytes]:
+        def read_part() -> tuple[_FileState, bytes]:
             answer = obstore.get(self._place.store, self._place.key, options=options)
             content = bytearray()
             for piece in answer.stream(min_chunk_size=1 << 20):
                 content += piece
-                if len(content) > end - begin:  # it may never end
+                if len(content) > end - begin:  # the stream may never end
                     break
-            return _Facts.of(answer.meta), bytes(content)
+            return _FileState.of(answer.meta), bytes(content)
 
-        where = shown(self._place.url)
+        where = public_source(self._place.url)
         try:
-            facts, content = _ask(self._place.url, part)
+            state, content = _ask(self._place.url, read_part)
         except FleetError as error:
-            if not str(error).endswith(NO_PARTS):
+            if error.problem != NO_PARTS:
                 raise
-            raise FleetError(f"{where}: the server gives no parts of files: copy it here") from None
-        if facts.differs(self._facts):
-            raise FleetError(f"{where}: {CHANGED}")
+            problem = "the server gives no parts of files"
+            raise FleetError(problem, where=where, remedy="copy the file here") from None
+        if state.differs(self._state):
+            raise FleetError(CHANGED, where=where)
         if len(content) != end - begin:
-            much = "ended early" if len(content) < end - begin else "the server sends too much"
-            raise FleetError(f"{where}: {much}")
+            problem = "ended early" if len(content) < end - begin else "the server sends too much"
+            raise FleetError(problem, where=where)
         return content
 
     def close(self) -> None:
@@ -159,58 +166,53 @@ class _Parts:
 def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:
     """Return size and tag of the file behind a URL, to notice that it has changed.
 
-    The tag is None where the server states none. A `FleetError` if it is not there, or cannot be
-    asked.
+    The tag is None if the server states none. A `FleetError` if the file is not there, or the
+    server does not answer.
     """
-    return _facts(_place(url, patience_s))[:2]
+    return _state_of(_open_store(url, patience_s))[:2]
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where an object is: its store, and its key there."""
+    """The place of an object: its store, and its key there."""
 
     url: str
     store: Any
     key: str = ""
 
 
-def _facts(place: _Place) -> _Facts:
+def _state_of(place: _Place) -> _FileState:
     import obstore
 
     try:
-        return _Facts.of(_ask(place.url, obstore.head, place.store, place.key))
-    except FleetError as error:  # a signed URL may be good for reading alone
-        if str(error).endswith(SILENT):
+        return _FileState.of(_ask(place.url, obstore.head, place.store, place.key))
+    except FleetError as error:  # a signed URL may allow nothing but reading
+        if error.problem == SILENT:
             raise
-        return _Facts.of(_ask(place.url, obstore.get, place.store, place.key).meta)
+        return _FileState.of(_ask(place.url, obstore.get, place.store, place.key).meta)
 
 
-def _file_name(url: str) -> str:
-    """Return the name of a file: as in the URL, as far as every system allows it."""
-    name = re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|]', "_", last_part(url))
-    return name if name.strip(".") else "drive"
-
-
-def _place(url: str, patience_s: float) -> _Place:
+def _open_store(url: str, patience_s: float) -> _Place:
     """Open the store that a URL leads to, without a request.
 
-    A `FleetError` if the URL cannot be one, or obstore is not installed.
+    A `FleetError` if the URL is none, or obstore is not installed.
     """
     scheme = scheme_of(url)
     try:
         from obstore import store as stores
     except ImportError as error:
+        remedy = "pip install 'roadeval[remote]'"
         raise FleetError(
-            f"{shown(url)}: URLs are read by obstore: pip install 'roadeval[remote]'"
+            "URLs are read by obstore", where=public_source(url), remedy=remedy
         ) from error
-    # Of connecting, of waiting for the next bytes, of the whole answer, and of trying again.
+    # The limits for connecting, for the next bytes, for the whole answer, and for trying again.
     pause = timedelta(seconds=patience_s / 2)
     times = {"connect_timeout": pause, "read_timeout": pause, "timeout": timedelta(days=1)}
     retries = {**RETRIES, "retry_timeout": pause}
     if scheme in BUCKETS:
         bucket, key = bucket_and_key(url)
         kind = stores.S3Store if scheme == "s3" else stores.GCSStore
-        # obstore ignores this variable where any option is given.
+        # obstore ignores this variable if any option is given.
         allowed = {**times, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
         store = _ask(url, kind, bucket, client_options=allowed, retry_config=retries)
         return _Place(url, store, key)
@@ -226,18 +228,18 @@ def _place(url: str, patience_s: float) -> _Place:
 
 
 def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: Any) -> Answer:
-    """Call a function of obstore; its errors become one line without a URL's secrets.
+    """Call a function of obstore; its errors become one line without the secrets of the URL.
 
-    It runs in a thread of its own, for obstore does not notice Ctrl-C while it waits for a server.
+    It runs in its own thread, as obstore does not notice Ctrl-C while it waits for a server.
     """
     answer = in_thread(lambda: function(*arguments, **options))
-    # In pieces: a signal that another thread receives does not end one long wait.
-    while not wait([answer], _PATIENCE_S).done:
+    # The wait is divided, as a signal that another thread receives does not end one long wait.
+    while not wait([answer], _POLL_S).done:
         pass
     try:
         return answer.result()
     except Exception as error:
         kind = type(error).__name__
-        found = (words for pattern, words in _REASONS if re.search(pattern, f"{kind} {error}"))
-        reason = next(found, f"cannot be read ({kind})")
-        raise FleetError(f"{shown(url)}: {reason}") from None
+        reasons = (reason for pattern, reason in _REASONS if re.search(pattern, f"{kind} {error}"))
+        reason = next(reasons, f"cannot be read ({kind})")
+        raise FleetError(reason, where=public_source(url)) from None

@@ -21,6 +21,7 @@ from roadeval.data.arrays import Floats, Matrix
 from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
+from roadeval.runtime.sentence import Sentence
 
 COEFFICIENTS: Final = {
     **dict.fromkeys(("plumb_bob", "rational_polynomial", "radtan"), (0, 4, 5, 8, 12)),
@@ -188,11 +189,11 @@ def ground_of(
         width, height = settings.size or size
         lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     elif lens is None:
-        return None, f"no metres: {why}"
+        return None, Sentence("no metres: {}", why)
     else:
         (above, pitch, roll), text = _find_pose(logged.mounting if logged else None, settings)
         if above is None or pitch is None:
-            return None, f"no metres: {text}"
+            return None, Sentence("no metres: {}", text)
         turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
         plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
     parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
@@ -208,7 +209,7 @@ def ground_of(
         remarks.append(covers)
     if settings.focal and lens.doubt:
         remarks.append(lens.doubt)
-    return ground, "; ".join(remarks)
+    return ground, Sentence("; ").join(remarks)
 
 
 def _find_lens(
@@ -226,12 +227,13 @@ def _find_lens(
     elif lens is not None and settings.model:
         lens = replace(lens, model=settings.model, distortion=settings.distortion)
     if lens is None:
-        return None, "the focal length is missing: give fov, or focal, with `ground`"
+        return None, Sentence("the focal length is missing: give fov, or focal, with {ground}")
     if problem := lens.problem:
-        raise GroundError(f"`ground.{problem.split()[0]}`: its {problem}: no camera has that")
+        setting = f"ground.{problem.split()[0]}"
+        raise GroundError(f"its {problem}, which no camera has", setting=setting)
     if not lens.has_shape(*size):
         shape = f"{lens.width}x{lens.height}, have another shape than the images"
-        raise GroundError(f"`ground.size`: its images, {shape}, {size[0]}x{size[1]}")
+        raise GroundError(f"its images, {shape}, {size[0]}x{size[1]}", setting="ground.size")
     last = max((n for n, number in enumerate(lens.distortion, 1) if number), default=0)
     model = lens.model.strip().lower()
     length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
@@ -264,7 +266,8 @@ def _find_pose(
         above = above if height is None else f": the log says {height:.6g} m"
         missing = [f"the camera's height above the ground{above}"] * has_no_height
         missing += ["its pitch"] * (pitch is None)
-        return (None, None, 0.0), f"missing: {', and '.join(missing)}; give it with `ground`"
+        text = "missing: {}; give it with {ground}"
+        return (None, None, 0.0), Sentence(text, ", and ".join(missing))
     # Adding 0 turns -0.0 into 0.0.
     shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
     way = "up" if pitch < 0 else "down"
@@ -277,7 +280,7 @@ def _plane_of_homography(
 ) -> tuple[tuple[float, ...], bool, str]:
     to_ground = np.reshape(settings.homography, (3, 3))
     if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
-        raise GroundError("`ground.homography` cannot be inverted")
+        raise GroundError("cannot be inverted", setting="ground.homography")
     matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
     plane = np.linalg.inv(to_ground @ matrix)
     # Distant places ahead must lie before the camera, not behind it.

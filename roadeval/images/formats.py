@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from roadeval.errors import RoadevalError
+from roadeval.runtime.sentence import Sentence
+
 Size = tuple[int, int]
 """Width and height in pixels."""
 MAX_PIXELS: Final = 1 << 25
 """Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
 
 
-class ImageError(ValueError):
+class ImageError(RoadevalError, ValueError):
     """An image that is damaged, of an unknown format, or too large; it continues "frame 7: "."""
 
 
@@ -32,8 +35,12 @@ class Limits:
             raise ImageError(f"an image of {width}x{height}")
         if width * height > self.max_pixels:
             raise ImageError(
-                f"an image of {width}x{height}, more than the {self.max_pixels} pixels that "
-                "`frames.max_pixels` allows"
+                Sentence(
+                    "an image of {}x{}, more than the {} pixels that {frames.max_pixels} allows",
+                    width,
+                    height,
+                    self.max_pixels,
+                )
             )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet.remote import readable
+from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.logs.log import LogDescription, describe, open_log
@@ -15,6 +15,7 @@ from roadeval.logs.settings import LogConfig
 from roadeval.logs.writing.writer import PackResult
 from roadeval.logs.writing.writer import pack as pack_messages
 from roadeval.runtime.files import AnyPath, put, writing
+from roadeval.runtime.sentence import Sentence
 
 MB: Final = 1_000_000
 
@@ -49,12 +50,12 @@ def info(
     def step(done: int, total: int) -> None:
         on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
 
-    described = describe(readable(drive), config, verify=verify, on_bytes=step)
+    described = describe(open_source(drive), config, verify=verify, on_bytes=step)
     if config is None or not config.truth.path or described.problem:
         return described
     from roadeval.jobs.run.summary import misfits_of_truth
 
-    with open_log(readable(drive), config) as log:
+    with open_log(open_source(drive), config) as log:
         return replace(described, misfits=(*misfits_of_truth(log),))
 
 
@@ -92,7 +93,7 @@ def pack(
     problem = describe(packed.path).problem if truth is not None else ""
     if not problem:
         return packed
-    warning = f"packed, but replay needs more settings: {problem}"
+    warning = Sentence("packed, but replay needs more settings: {}", problem)
     return replace(packed, warnings=(*packed.warnings, warning))
 
 

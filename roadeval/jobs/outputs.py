@@ -16,8 +16,8 @@ from roadeval.results.fleet import FILES
 from roadeval.results.folder import CONTENT, names_of_results
 from roadeval.runtime.files import (
     AnyPath,
-    claimed_file,
-    claimed_folder,
+    claim_file,
+    claim_folder,
     find_partial,
     remove,
     target_of,
@@ -83,9 +83,9 @@ def holding(
         if places[number] in earlier:
             raise RoadevalError(f"{path}: is an input or another output; name a file of its own")
     with ExitStack() as claims:
-        certain = [_claim(claims, path, claimed_file(path)) for path in paths]
+        certain = [_claim(claims, path, claim_file(path)) for path in paths]
         if folder:
-            certain.append(_claim(claims, folder, claimed_folder(folder, CONTENT)))
+            certain.append(_claim(claims, folder, claim_folder(folder, CONTENT)))
         yield all(certain)
 
 

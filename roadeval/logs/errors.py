@@ -9,6 +9,10 @@ class LogError(RoadevalError):
     """A problem of a log: what is wrong, in which file or topic, and what to do next."""
 
 
+class UnclearLabelsError(LogError):
+    """Values of labels whose meaning only the user knows."""
+
+
 class FrameError(RoadevalError):
     """One frame that cannot be decoded; a run continues without it."""
 
@@ -21,5 +25,5 @@ class BadRecord(Exception):  # noqa: N818  (never leaves this room)
     """A record that is missing, or whose parts contradict each other."""
 
 
-class BadMessage(Exception):  # noqa: N818  (never leaves this room)
+class BadMessage(RoadevalError):  # noqa: N818  (never leaves this room)
     """A message that cannot be decoded."""

@@ -80,7 +80,8 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     `LogError` if there is no MCAP file; it names the files there, and how to convert them.
     """
     if not path.is_dir():
-        _check(path)
+        if problem := _problem(path):
+            raise LogError(problem, where=path)
         return [path], []
     try:
         inside = sorted(filter(is_shown, path.iterdir()), key=natural)
@@ -124,15 +125,16 @@ def _files_in_metadata(folder: Path, there: Set[Path]) -> set[Path]:
     return files if files & there else set()
 
 
-def _problem(file: Path) -> str:
+def _problem(path: Path) -> str:
     """Return why a file cannot be a part of a log; empty if it can."""
-    if not file.exists():
-        return "the file is missing"
     try:
-        _check(file)
-    except LogError as error:
-        return str(error).removeprefix(f"{file}: ")
-    return ""
+        check_input(path)
+        with path.open("rb") as file:
+            return content_problem(path, file)
+    except FileNotFoundError:
+        return "the file is missing"
+    except OSError as error:
+        return error.strerror or str(error)
 
 
 def natural(path: Path) -> list[tuple[int, str]]:
@@ -141,31 +143,23 @@ def natural(path: Path) -> list[tuple[int, str]]:
     return [(int(number or 0), text) for number, text in parts]
 
 
-def _check(path: Path) -> None:
-    try:
-        check_input(path)
-        with path.open("rb") as file:
-            check_content(path, file)
-    except OSError as error:
-        raise LogError(f"{path}: {error.strerror or error}") from error
-
-
-def check_content(path: Path, file: IO[bytes]) -> None:
-    """Raise a `LogError` if an open file is no MCAP file; it says what the file is instead."""
+def content_problem(path: Path, file: IO[bytes]) -> str:
+    """Return what an open file is if it is no MCAP file; else empty."""
     size = file.seek(0, 2)
     file.seek(0)
     head = file.read(_HEAD)
     file.seek(max(size - len(MAGIC), 0))
     tail = file.read(len(MAGIC))
     if not head:
-        raise LogError(f"{path}: the file is empty")
+        return "the file is empty"
     wrong = sum(ours != theirs for ours, theirs in zip(MAGIC, head, strict=False))
     if head.startswith(MAGIC) or (wrong <= 2 and len(head) >= len(MAGIC)) or tail == MAGIC:
-        return
+        return ""
     other = _other_kind(path, head)
-    if other or not _RECORD.search(head):
-        other = other or f"something else (it begins with {head[:8].hex(' ')})"
-        raise LogError(f"{path}: not an MCAP file but {other}")
+    if not other and _RECORD.search(head):
+        return ""
+    other = other or f"something else (it begins with {head[:8].hex(' ')})"
+    return f"not an MCAP file but {other}"
 
 
 def _other_kind(path: Path, head: bytes) -> str:

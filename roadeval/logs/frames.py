@@ -48,6 +48,7 @@ from roadeval.logs.truth.pairing import (
     frames_of,
     tolerance,
 )
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 
 TRUTH: Final = "/truth"
@@ -121,15 +122,16 @@ class Selection:
     @property
     def notes(self) -> tuple[str, ...]:
         """Warnings about the camera's images, a sentence each."""
-        notes = []
+        notes = list[str]()
         if self.white not in (None, 1, WHITE):
-            notes.append(f"a sample of {self.white:g} is white; `frames.white` sets another")
+            white = "a sample of {} is white; {frames.white} sets another"
+            notes.append(Sentence(white, f"{self.white:g}"))
         if self.image.turned != 1:
             how = "turned, as their EXIF orientation or display matrix asks"
-            what = f"{how}; `frames.unturned` leaves them as stored"
+            what = "its images are {}; {frames.unturned} leaves them as stored"
             if not self.camera.images.limits.turn:
-                what = f"as stored, and would be {how}, by viewers and annotation tools"
-            notes.append(f"its images are {what}")
+                what = "its images are as stored, and would be {}, by viewers and annotation tools"
+            notes.append(Sentence(what, how))
         return tuple(notes)
 
     def among_truth(self, numbers: Sequence[int]) -> Sequence[int]:
@@ -146,24 +148,24 @@ class Selection:
     @property
     def reasons(self) -> tuple[str, ...]:
         """The topics that were chosen and why, a sentence each."""
-        lines = [f"image: {self.image.name} ({'; '.join((self.image_why, *self.notes))})"]
+        about = Sentence("; ").join((self.image_why, *self.notes))
+        lines: list[str] = [Sentence("image: {} ({})", self.image.name, about)]
         for name, source in self.labels.items():
             what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
-            words = source.meaning.words
-            if name == SHADOW:
-                words = words.replace("road is", "shadow is")
-            lines.append(f"{what}: {source.where} ({source.why}; {words})")
-            lines += [f"{what}: {note}" for note in (*source.notes, *source.meaning.notes)]
+            lines.append(f"{what}: {source.where} ({source.why}; {source.meaning.words})")
+            notes = (*source.notes, *source.meaning.notes)
+            lines += [Sentence("{}: {}", what, note) for note in notes]
         if lens := self.calibration:
             place = f", mounted in {lens.mounting.parent}" if lens.mounting else ""
             model = lens.model or f"{'a nameless' if lens.bends else 'no'} distortion"
             lines.append(f"calibration: {lens.topic} ({model}{place})")
         if self.calibration_why:
-            lines.append(f"{'' if lens else 'no '}calibration: {self.calibration_why}")
+            none = "" if lens else "no "
+            lines.append(Sentence("{}calibration: {}", none, self.calibration_why))
         if self.ground_why:
             lines.append(self.ground_why)
         if self.no_truth:
-            lines.append(f"no truth: {self.no_truth}")
+            lines.append(Sentence("no truth: {}", self.no_truth))
         if (clock := self.camera.clock) is not Clock.STAMP:
             lines.append(f"the header stamps are all zero or equal; used in place of them: {clock}")
         return tuple(lines)
@@ -194,11 +196,12 @@ def settle(
         truth = choose_truth(topics, image, settings.truth, config.labels, of_rig=of_rig)
     choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, settings.shadow)}
     if truth.topic == image:
-        raise LogError(f"`topics.truth` {image.name}: it is the image's own topic")
+        raise LogError(f"{image.name} is the image's own topic", setting="topics.truth")
     for name, topic in settings.masks.items():
-        choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
+        setting = f"topics.masks.{name}"
+        choices[name] = Choice(named(topics, topic, setting), "asked for")
         if choices[name].topic == truth.topic:
-            raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
+            raise LogError(f"{topic} is the truth that it is scored against", setting=setting)
     images = readers[image.name]
     most_ns = tolerance(images, settings.sync_tolerance_ms)
     camera = Camera(images, image, clock_of(images), most_ns, settings.resize_truth)
@@ -209,15 +212,17 @@ def settle(
             pairing = by_time(reader, camera, settings.sync_offset_ms if is_truth else 0.0)
             check_size(label_topic.size, reader, 0, camera, pairing)
             values = MaskSettings(labels=config.labels if is_truth else LabelSettings())
-            meaning = meaning_of(reader, values)
+            shown = "shadow" if name == SHADOW else "road"
+            meaning = meaning_of(reader, values, shown=shown)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     calibration = calibration_of(image, topics, readers)
     if any(calibration) and image.turned != 1 and camera.images.limits.turn:
-        reason = "it is of the sensor's rows, and the images are turned (`frames.unturned`)"
-        calibration = None, reason
+        reason = "it is of the sensor's rows, and the images are turned ({frames.unturned})"
+        calibration = None, Sentence(reason)
     ground, ground_why = ground_of(calibration[0], config.ground, image.size)
     if any(config.ground.distortion) and is_rectified(image.name):
-        ground_why += "; `ground.distortion` is applied although the topic's name says rectified"
+        rectified = " is applied although the topic's name says rectified"
+        ground_why = Sentence("{}; {ground.distortion}{}", ground_why, rectified)
     return Selection(
         camera,
         why,
@@ -270,7 +275,7 @@ def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
         try:
             to_rgb(picture, reader.limits)
         except BadMessage as error:
-            problem = problem or str(error)
+            problem = problem or error.sentence
         else:
             return
     raise undecodable(reader, problem)
@@ -314,7 +319,7 @@ class Accounting:
     def losses(self) -> tuple[str, ...]:
         """A sentence on each undecodable frame that is not ``in_chunks``."""
         lost = sorted(self.undecodable.keys() - self.in_chunks)
-        return tuple(f"frame {number}: {self.undecodable[number]}" for number in lost)
+        return tuple(Sentence("frame {}: {}", number, self.undecodable[number]) for number in lost)
 
     @property
     def notes(self) -> Iterator[str]:
@@ -333,9 +338,9 @@ class Accounting:
             )
         if len(self.frame_ids) > 1:
             names = [f"{visible(name)} ({count})" for name, count in self.frame_ids.items()]
-            yield (
-                f"the images are of several cameras, by frame_id: {first_of(names, 5)}; "
-                "`topics.frame_id` chooses one"
+            yield Sentence(
+                "the images are of several cameras, by frame_id: {}; {topics.frame_id} chooses one",
+                first_of(names, 5),
             )
         for level in ("black", "white"):
             blank = [number for number, colour in self.blank.items() if colour == level]
@@ -395,11 +400,10 @@ class LoggedFrame:
         try:
             return self._decode()
         except (BadMessage, FrameError) as error:
-            reason = f"frame {self.number}: {error}"
-            self.accounting.undecodable[self.number] = str(error)
+            self.accounting.undecodable[self.number] = error.sentence
             if isinstance(self.picture, LostMessageError):
                 self.accounting.in_chunks.add(self.number)
-            raise FrameError(reason) from error
+            raise FrameError.of(error, f"frame {self.number}") from error
 
     def _decode(self) -> Frame:
         import cv2
@@ -448,7 +452,7 @@ class LoggedFrame:
         try:
             label = self.selection.labels[name].meaning.read(picture, camera.images.limits)
         except BadMessage as error:
-            raise FrameError(f"{place}: {error}") from error
+            raise FrameError.of(error, place) from error
         theirs, resize = label.truth.shape[1::-1], camera.resize_labels
         if problem := size_problem(place, theirs, "its image", sizes[0], resize=resize):
             raise FrameError(problem)
@@ -519,11 +523,15 @@ class FrameStream:
             shown = f"{name.removeprefix('/')}: "
             count, away = partners.unpaired(of_all=frames == self.accounting.in_log)
             if count:
-                yield (
-                    f"{shown}{count} of the {len(source.pictures)} labels of {source.where} belong "
-                    f"to no frame: the first is {away / 1e6:.1f} ms from the nearest, and "
-                    f"{source.pairing.tolerance / 1e6:.1f} may lie between "
-                    "(`topics.sync_tolerance_ms`)"
+                yield Sentence(
+                    "{}{} of the {} labels of {} belong to no frame: the first is {} ms from the "
+                    "nearest, and {} may lie between ({topics.sync_tolerance_ms})",
+                    shown,
+                    count,
+                    len(source.pictures),
+                    source.where,
+                    f"{away / 1e6:.1f}",
+                    f"{source.pairing.tolerance / 1e6:.1f}",
                 )
             if partners.missed:
                 lost = f"{partners.missed} frames have no label: the one in reach lies nearer to"

@@ -17,8 +17,8 @@ import numpy as np
 from roadeval.images.formats import Limits
 from roadeval.logs.container.file import Container, Damage, containers_in, damage_of
 from roadeval.logs.container.records import MAGIC
-from roadeval.logs.errors import BadRecord, LogError
-from roadeval.logs.files import check_content, files_of
+from roadeval.logs.errors import BadRecord, LogError, UnclearLabelsError
+from roadeval.logs.files import content_problem, files_of
 from roadeval.logs.frames import (
     TRUTH,
     FrameStream,
@@ -35,6 +35,7 @@ from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_
 from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.labels import LabelSource, log_and_topic, source_beside_log
 from roadeval.logs.truth.names import find_keys, shown_name
+from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import visible
 
 
@@ -57,7 +58,8 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
         opened, source, path = path.file, path.source, path.path
-        check_content(path, opened)
+        if problem := content_problem(path, opened):
+            raise LogError(problem, where=path)
         files, damage = [path], list[Damage]()
     else:
         opened, source, path = None, str(path), Path(path)
@@ -217,31 +219,35 @@ class Log:
                 selection = replace(selection, labels={TRUTH: truth, **selection.labels})
             masks = {name: self._masks(name, m, selection) for name, m in self.config.masks.items()}
         except LogError as error:
-            raise LogError(f"{self.path.name}: {error}") from error
+            raise LogError.of(error, self.path.name) from error
         return replace(selection, labels={**selection.labels, **masks})
 
     def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> LabelSource:
         """Read masks that lie beside the log; their messages name the settings of their variant."""
 
-        def of_variant(text: str) -> str:
-            text = text.replace("`labels.", f"`masks.{name}.labels.")
-            return text.replace("`truth.", f"`masks.{name}.")
+        def of_variant(setting: str) -> Setting:
+            table, _, key = setting.partition(".")
+            tables = {"labels": f"masks.{name}.labels", "truth": f"masks.{name}"}
+            return Setting(f"{tables[table]}.{key}" if table in tables else setting)
 
         try:
             if (log := log_and_topic(settings.path)[0]) == settings.path:
-                raise LogError(f"{log}: a log; name a topic of it, as {log}:/topic")
+                remedy = f"name a topic of it, as {log}:/topic"
+                raise LogError("a log", where=log, remedy=remedy)
             masks = self._beside_log(settings, selection)
             if selection.truth is not None and masks.where == selection.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
         except LogError as error:
-            reason = str(error)
-            if "`labels.road`" in reason and not settings.labels.road:
-                reason += "; or, for confidences, their threshold"
-            one_or_other = "give `truth.first` 0 or `truth.first` 1"
-            reason = reason.replace(one_or_other, "set `truth.first` to 0 or to 1")
-            raise LogError(f"`masks` {name}: {of_variant(reason)}") from error
-        meaning = replace(masks.meaning, notes=(*map(of_variant, masks.meaning.notes),))
-        return replace(masks, meaning=meaning, notes=(*map(of_variant, masks.notes),))
+            refused = error.rename_settings(of_variant)
+            if isinstance(error, UnclearLabelsError):
+                or_threshold = "{}; or, for confidences, their threshold"
+                refused.remedy = Sentence(or_threshold, refused.remedy)
+            raise LogError.of(refused, Sentence("{masks} {}", name)) from error
+        notes, meant = (
+            tuple(name_settings(note, of_variant) for note in notes)
+            for notes in (masks.notes, masks.meaning.notes)
+        )
+        return replace(masks, meaning=replace(masks.meaning, notes=meant), notes=notes)
 
     def _beside_log(
         self, settings: MaskSettings, selection: Selection, offset_ms: float = 0.0
@@ -266,7 +272,7 @@ class Log:
             if choice.topic is None:
                 raise LogError(f"{log}: {choice.why}; name its topic, as {log}:/topic")
             topic = choice.topic.name
-        reader = other.readers[named(other.topics, topic, "topic").name]
+        reader = other.readers[named(other.topics, topic, "truth.path").name]
         name = "" if other.path.resolve() == self.path.resolve() else other.name
         return source_beside_log(
             reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms
@@ -303,14 +309,20 @@ class Log:
             numbers = [*(of_camera if settings.labelled else islice(of_camera, most))]
             if not numbers:
                 raise LogError(
-                    f"{self.path.name}: `topics.frame_id` {camera}: no image of the range has it; "
-                    f"the first has {images.frame_id(first) or 'none'}"
+                    f"no image of the range has {camera}; "
+                    f"the first has {images.frame_id(first) or 'none'}",
+                    where=self.path.name,
+                    setting="topics.frame_id",
                 )
         if settings.labelled:
             numbers = [*islice(labelled_numbers(truth, images, numbers), most)] if truth else []
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
-                raise LogError(f"{self.path.name}: `frames.labelled` leaves no frame: {why}")
+                raise LogError(
+                    Sentence("leaves no frame: {}", why),
+                    where=self.path.name,
+                    setting="frames.labelled",
+                )
         numbers = numbers[:: settings.every][: settings.max_frames]
         if only is not None:
             numbers = [number for number in numbers if number in only]
@@ -381,7 +393,7 @@ def describe(
             selection = log.select()
             picks = (*selection.reasons, *look_at_images(selection))
         except LogError as error:
-            problem = str(error)
+            problem = error.sentence
         verified = verify or log.size <= SMALL
         sha256 = log.verify(on_bytes) if verified else None
         return LogDescription(

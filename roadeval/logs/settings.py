@@ -10,11 +10,13 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval, Len
 
+from roadeval.errors import SettingError
 from roadeval.geometry.settings import GroundSettings
 from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import Checked, Flag
-from roadeval.runtime.text import elided
+from roadeval.runtime.text import elide
 
 NS: Final = 1_000_000_000
 _EPOCH: Final = datetime.fromisoformat("1970-01-01T00:00:00+00:00")
@@ -48,7 +50,7 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         if seconds_text or fraction:
             return start_ns + int(seconds_text or 0) * NS + int(fraction[:9].ljust(9, "0"))
     raise LogError(
-        f"{elided(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
+        f"{elide(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
         "2013-05-01T12:00:00Z"
     )
 
@@ -61,7 +63,7 @@ def _time(moment: object) -> object:
         try:
             parse_time(moment)
         except LogError as error:
-            raise ValueError(str(error)) from error
+            raise SettingError.of(error) from error
     return moment
 
 
@@ -143,10 +145,16 @@ class LabelSettings:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
-            raise ValueError("`labels.ignore` needs `labels.road`: name the values that mean road")
+            raise SettingError(
+                Sentence("needs {road}"),
+                setting="ignore",
+                remedy="name the values that mean road",
+            )
         if self.ignore_colors and not self.road_colors:
-            raise ValueError(
-                "`labels.ignore_colors` needs `labels.road_colors`: name the colours that mean road"
+            raise SettingError(
+                Sentence("needs {road_colors}"),
+                setting="ignore_colors",
+                remedy="name the colours that mean road",
             )
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
@@ -253,4 +261,8 @@ class LogConfig:
 
     def __post_init__(self) -> None:
         if self.truth.path and self.topics.truth:
-            raise LogError("`truth.path` and `topics.truth` both say where the truth is: give one")
+            raise LogError(
+                Sentence("says where the truth is, and so does {topics.truth}"),
+                setting="truth.path",
+                remedy="give one",
+            )

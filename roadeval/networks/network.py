@@ -16,8 +16,9 @@ from roadeval.data import CERTAIN, Output, Packed, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
 from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
+from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.runtime.text import visible
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.threads import map_ordered
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,8 @@ class Network:
                 raise self.file.error("gives NaN")
             scores = np.clip(scores, -HUGE, HUGE)  # infinity times 0 would be NaN
         if settings.activation == "none" and not is_probable(scores.min(), scores.max()):
-            raise self.file.error("leaves 0 to 1: it gives no probabilities, see `net.activation`")
+            see = Sentence("see {net.activation}")
+            raise self.file.error("leaves 0 to 1, so it gives no probabilities", see)
         if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
             nearest = cv2.INTER_NEAREST if is_ultralytics(self.file) else cv2.INTER_NEAREST_EXACT
@@ -101,11 +103,11 @@ class Network:
             values = scores[number].astype(np.float32)
             return resize_to_frame(values, frame, settings, cv2.INTER_LINEAR)
 
-        def coded(shares: Values) -> Probability:
+        def encode(shares: Values) -> Probability:
             return np.rint(np.clip(shares, 0, 1) * CERTAIN).astype(np.uint16)
 
         total, single = road_probability(plane, len(scores), settings)
-        return coded(total), [*map(coded, single)]
+        return encode(total), [*map(encode, single)]
 
 
 HUGE: Final = 3e4
@@ -240,26 +242,31 @@ def complete_settings(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """
     if settings.outputs is None and has_instances(file):
         raise file.question(
-            "finds instances, as boxes or queries with masks, and gives no map of classes: export "
-            "a network for semantic segmentation (of Ultralytics one called -sem), or name an "
-            "output that is a map by `net.outputs`"
+            "finds instances, as boxes or queries with masks, and gives no map of classes",
+            Sentence(
+                "export a network for semantic segmentation (of Ultralytics one called -sem), or "
+                "name an output that is a map by {net.outputs}"
+            ),
         )
     usual: Literal["stretch", "letterbox"] = "letterbox" if is_ultralytics(file) else "stretch"
     settings = replace(settings, sha256=file.sha256, resize=settings.resize or usual)
     settings = complete_input(settings, file)
     names = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(names) > 1:
-        raise file.question("gives several outputs: name those that show road by `net.outputs`")
+        name_them = Sentence("name those that show road by {net.outputs}")
+        raise file.question("gives several outputs", name_them)
     outputs = settings.outputs or names
     if unknown := [name for name in outputs if name not in names]:
-        raise file.question(f"has no output {unknown[0]!r}: see `net.outputs`")
+        see = Sentence("see {net.outputs}")
+        raise file.question(f"has no output {unknown[0]!r}", see)
     settings = replace(settings, outputs=outputs)
     by_output = [
         complete_output(settings, file, name, sample)
         for name, sample in zip(outputs, samples_of(settings, file), strict=True)
     ]
     if any(settings != by_output[0] for settings in by_output):
-        raise file.question("its outputs differ in kind: name some of one kind by `net.outputs`")
+        name_some = Sentence("name some of one kind by {net.outputs}")
+        raise file.question("its outputs differ in kind", name_some)
     return by_output[0]
 
 
@@ -323,7 +330,7 @@ def _samples(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
         return arrays
 
     # In a thread, so that a signal is heard meanwhile.
-    by_output = [*zip(*ordered(run, make_test_images(settings), 1), strict=True)]
+    by_output = [*zip(*map_ordered(run, make_test_images(settings), 1), strict=True)]
     for name, arrays in zip(outputs, by_output, strict=True):
         if len({array.shape for array in arrays}) > 1:
             raise file.error(_VARIES.format(name, arrays[1].shape, arrays[0].shape))
@@ -398,14 +405,15 @@ def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     layout = settings.layout or ("NCHW" if shape[1] in (1, 3) else "NHWC")
     count, rows, columns = shape[1:] if layout == "NCHW" else (shape[3], shape[1], shape[2])
     if settings.layout is None and count not in (1, 3):
-        raise file.question("give the order of its input's lengths by `net.layout`")
+        give = Sentence("give it by {net.layout}")
+        raise file.question("does not say the order of its input's lengths", give)
     width, height = settings.size or (columns, rows)
     if width is None or height is None:
-        raise file.question(
-            "takes images of any size: give width and height by `net.size`, as [512, 256]"
-        )
+        give = Sentence("give width and height by {net.size}, as [512, 256]")
+        raise file.question("takes images of any size", give)
     if columns not in (None, width) or rows not in (None, height):
-        raise file.question(f"takes no input of {width}x{height}: see `net.size`")
+        see = Sentence("see {net.size}")
+        raise file.question(f"takes no input of {width}x{height}", see)
     settings = replace(
         settings,
         layout=layout,
@@ -421,9 +429,8 @@ def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
         )
     for name in ("mean", "deviation"):
         if len(getattr(settings, name)) not in (1, expected):
-            raise file.error(
-                f"`net.{name}` must hold one number, or one for each of {expected} channels"
-            )
+            problem = f"must hold one number, or one for each of {expected} channels"
+            raise file.error(Sentence("{} {}", Setting(f"net.{name}"), problem))
     return settings
 
 
@@ -458,15 +465,15 @@ def complete_output(
     named = tuple(n for n, name in class_names(file).items() if name == "road" and n < count)
     road = settings.road or named or ((count - 1,) if count <= 2 else ())
     if not road:
-        raise file.question(
-            f"give the numbers of the classes of its {count} that are road by `net.road`"
-        )
+        give = Sentence("give the numbers of those that are road by {net.road}")
+        raise file.question(f"tells {count} classes apart", give)
     if max(road) >= count:
-        raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
+        see = Sentence("see {net.road}")
+        raise file.question(f"has no class {max(road)}, but {count} from 0", see)
     if decide == "argmax" and len(road) == count:
         raise file.question(
-            f"all classes of its output {name!r} are road; name at least one that is not: see "
-            "`net.road` and `net.decide`"
+            f"all classes of its output {name!r} are road",
+            Sentence("name at least one that is not (see {net.road} and {net.decide})"),
         )
     return replace(
         settings,
@@ -480,11 +487,13 @@ def complete_output(
 def complete_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings:
     """Complete the settings of a network whose output holds numbers of classes."""
     if settings.threshold is not None:
-        raise file.question(f"its output {name!r} holds only classes: leave `net.threshold` out")
+        leave = Sentence("leave {net.threshold} out")
+        raise file.question(f"its output {name!r} holds only classes", leave)
     names = class_names(file)
     road = settings.road or tuple(n for n, name in names.items() if name == "road")
     if is_ultralytics(file) and len(names) == 1:
         road = (1,)  # a single class is written as 1, whatever its number is
     if not road:
-        raise file.question("give the numbers of the classes that are road by `net.road`")
+        give = Sentence("give the numbers of those that are road by {net.road}")
+        raise file.question("gives numbers of classes", give)
     return replace(settings, road=road, activation="classes", decide="argmax")

@@ -21,6 +21,7 @@ from roadeval.data.words import first_of
 from roadeval.networks.settings import MIB, NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 from roadeval.runtime.threads import time_limit
 
@@ -34,9 +35,8 @@ LARGEST: Final = (1 << 31) - 1
 """Bytes that a protobuf file can have; larger weights lie in files beside it."""
 _SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
-_LATE: Final = (
-    "takes longer than {:g} s{} to {}, or has no end: mend it, or allow more by `net.seconds`"
-)
+_LATE: Final = "takes longer than {:g} s{} to {}, or has no end"
+_MORE_TIME: Final = Sentence("mend it, or allow more by {net.seconds}")
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
 _PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
 _PROBE: Final = """
@@ -103,7 +103,7 @@ class OnnxFile:
             except NetworkError as error:
                 if late.is_set():
                     more = f" or more than {grown / MIB:,.0f} MiB" if math.isfinite(grown) else ""
-                    raise self.error(_LATE.format(seconds, more, "run")) from error
+                    raise self.error(_LATE.format(seconds, more, "run"), _MORE_TIME) from error
                 raise
         for name, array in zip(outputs, arrays, strict=True):
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf":
@@ -115,20 +115,22 @@ class OnnxFile:
         with suppress(TypeError):  # NumPy lacks the type, and an array of it is refused later
             size = math.prod(n or 1 for n in tensor.shape) * np.dtype(tensor.dtype).itemsize
             if size > limit:
-                raise self.error(
-                    f"{tensor} takes {size / MIB:,.0f} MiB, more than the {limit / MIB:g} of "
-                    "`net.megabytes`: export it smaller, or allow more"
-                )
+                problem = f"{tensor} takes {size / MIB:,.0f} MiB, more than {limit / MIB:g}"
+                remedy = Sentence("export it smaller, or allow more by {net.megabytes}")
+                raise self.error(problem, remedy)
 
-    def error(self, problem: str) -> NetworkError:
+    def error(self, problem: str, remedy: str = "") -> NetworkError:
         """Return an error about the file."""
-        return NetworkError(f"{self.path}: {problem}")
+        return NetworkError(problem, where=self.path, remedy=remedy)
 
-    def question(self, problem: str) -> NetworkError:
+    def question(self, problem: str, remedy: str = "") -> NetworkError:
         """Return an error that asks for a missing setting, and lists inputs and outputs."""
         inputs = first_of([*map(str, self.inputs)], _SHOWN)
         outputs = first_of([*map(str, self.outputs)], _SHOWN)
-        return self.error(f"{problem} (inputs: {inputs}; outputs: {outputs})")
+        listed = f" (inputs: {inputs}; outputs: {outputs})"
+        if remedy:
+            return self.error(problem, Sentence("{}{}", remedy, listed))
+        return self.error(f"{problem}{listed}")
 
 
 def load(settings: NetSettings) -> OnnxFile:
@@ -137,7 +139,8 @@ def load(settings: NetSettings) -> OnnxFile:
     A `NetworkError` if the file cannot be used, or its SHA-256 is not that of the settings.
     """
     if not settings.file:
-        raise NetworkError("`net.file` names no network: give the path of an ONNX file")
+        remedy = "give the path of an ONNX file"
+        raise NetworkError("names no network", setting="net.file", remedy=remedy)
     path = Path(settings.file)
     with reading(path, "cannot read the network"):
         check_input(path)
@@ -147,10 +150,8 @@ def load(settings: NetSettings) -> OnnxFile:
     state = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
     file = _open(path, settings.seconds, *state)
     if settings.sha256 not in (None, file.sha256):
-        raise file.error(
-            f"is another network than was asked for: its SHA-256 is {file.sha256}, and "
-            f"`net.sha256` {settings.sha256}"
-        )
+        other = "is another network than was asked for: {net.sha256} says {}, and its own is {}"
+        raise file.error(Sentence(other, settings.sha256, file.sha256))
     return file
 
 
@@ -183,7 +184,8 @@ def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
     try:
         ending = subprocess.run(probe, check=False, capture_output=True, timeout=seconds)
     except subprocess.TimeoutExpired as error:
-        raise NetworkError(f"{path}: {_LATE.format(seconds, '', 'open')}") from error
+        late = _LATE.format(seconds, "", "open")
+        raise NetworkError(late, where=path, remedy=_MORE_TIME) from error
     if ending.returncode not in (0, 1):
         raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
     options = onnxruntime.SessionOptions()

@@ -45,17 +45,17 @@ class Pipeline:
         names = {name: stage.name for name, stage in pairs if not stage.is_filter}
         return Pipeline(tuple(names), {name: self.settings[name] for name in names.values()})
 
-    def learning(self) -> tuple[str, ...]:
+    def learning_stages(self) -> tuple[str, ...]:
         """Return the names of the stages that learn."""
         return tuple(stage.name for stage in self.stages() if stage.fit is not None)
 
-    def relevant(self) -> dict[str, dict[str, Any]]:
+    def relevant_settings(self) -> dict[str, dict[str, Any]]:
         """Return the settings that the learnt parameters depend on, by stage.
 
         These are settings of stages that learn, change the image, or are heard, except those that
         are `inference_only` or `places`.
         """
-        heard = self.heard()
+        heard = self.heard_stages()
         return {
             stage.name: {
                 key: value
@@ -66,7 +66,7 @@ class Pipeline:
             if stage.fit is not None or not stage.yields_mask or stage in heard
         }
 
-    def heard(self) -> tuple[Stage, ...]:
+    def heard_stages(self) -> tuple[Stage, ...]:
         """Return the stages whose masks a later stage learns from."""
         pairs = self._pairs()
         hearing = [n for n, (stage, own) in enumerate(pairs) if stage.hears and stage.hears(own)]

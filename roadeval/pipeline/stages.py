@@ -166,7 +166,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
 def guard(stage: Stage) -> Stage:
     """Return a stage whose errors are `StageError`, and which raises one for a wrong output."""
 
-    def named(problem: str, work: Callable[..., Any]) -> Callable[..., Any]:
+    def name_errors(problem: str, work: Callable[..., Any]) -> Callable[..., Any]:
         def run(*arguments: Any) -> Any:
             try:
                 return work(*arguments)
@@ -181,15 +181,15 @@ def guard(stage: Stage) -> Stage:
     def bind(settings: Any, parameters: Any) -> Callable[[View], Output]:
         run, specs = stage.bind(settings, parameters), stage.specs(settings)
 
-        def checked(view: View) -> Output:
+        def run_checked(view: View) -> Output:
             output = run(view)
             check_output(output, view, stage, specs)
             return output
 
-        return named("failed", checked)
+        return name_errors("failed", run_checked)
 
-    fit = stage.fit and named("cannot learn", stage.fit)
-    return replace(stage, bind=named("cannot be made ready", bind), fit=fit)
+    fit = stage.fit and name_errors("cannot learn", stage.fit)
+    return replace(stage, bind=name_errors("cannot be made ready", bind), fit=fit)
 
 
 def _place(error: Exception) -> str:

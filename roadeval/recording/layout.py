@@ -234,7 +234,9 @@ class RecordRule:
         match = _RULE.fullmatch(text)
         if match is None:
             raise RecordingError(
-                f"`output.record` {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
+                f"there is no choice {text}",
+                setting="output.record",
+                remedy="choose all, masks, worst:K, every:N or none (as worst:20)",
             )
         plain, counted, number = match.groups()
         return cls(plain or counted, int(number or 0))

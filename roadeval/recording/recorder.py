@@ -44,6 +44,7 @@ from roadeval.recording.layout import Layout, RecordingError, RecordRule
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import indexed_messages
 from roadeval.runtime.files import NewFile, partial_name, remove, writing
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.threads import in_thread
 
 
@@ -368,13 +369,16 @@ class Recorder:
         size, room = shown * encoded.size, self._room()
         if self._rule.kind == "worst" and size > HELD:
             memory = f"{HELD >> 20} MiB of memory, about {HELD // encoded.size}"
-            return f"`output.record` worst:{self._rule.number} keeps those that fit in {memory}"
+            fitting = "{output.record} worst:{} keeps those that fit in {}"
+            return Sentence(fitting, self._rule.number, memory)
         sentence = f"the recording will take about {size / 1e6:.0f} MB"
         if size > room:
             free = f"{(room + LEAST_FREE) / 1e6:.0f} MB are free"
-            return (
-                f"{sentence}, and only {free}: `output.record` masks or worst:50 takes less, or "
-                "`output.save` names a place on another disk"
+            return Sentence(
+                "{}, and only {}: {output.record} masks or worst:50 takes less, or {output.save} "
+                "names a place on another disk",
+                sentence,
+                free,
             )
         return sentence if size > WORTH_SAYING else ""
 

@@ -25,8 +25,8 @@ from roadeval.report.chart import FAINT, thin
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.images import ExampleFrame, encode_jpeg, pictures_of
 from roadeval.report.pdf.typeset import typeset_figure
-from roadeval.runtime.text import elided, visible
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.text import elide, visible
+from roadeval.runtime.threads import map_ordered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,7 +104,7 @@ def write_figures(
 
     # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
     # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.
-    return [path for paths in ordered(write, draw(), 1) for path in paths]
+    return [path for paths in map_ordered(write, draw(), 1) for path in paths]
 
 
 def as_svg(figure: Figure) -> bytes:
@@ -180,7 +180,7 @@ def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> 
     axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     axes[-1].set_xlabel("frame")
     lines, variants = (entries[::-1] for entries in axes[0].get_legend_handles_labels())
-    labels = [elided(_LABELS.get(variant, variant), _LONGEST) for variant in variants]
+    labels = [elide(_LABELS.get(variant, variant), _LONGEST) for variant in variants]
     columns = 100 // (max(map(len, labels)) + 10)
     axes[0].legend(
         lines,
@@ -239,7 +239,7 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
             box = Bbox.from_extents(left / WIDTH, low, right / WIDTH, high)
             FigurePicture(figure, picture, box)
             if row == 0:
-                name = elided(title, max(int(11 * column_width), 3))
+                name = elide(title, max(int(11 * column_width), 3))
                 above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
                 write((left + right) / 2, TOP - GAP, name, **above)
     return figure

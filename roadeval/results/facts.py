@@ -26,7 +26,7 @@ from roadeval.evaluation.tables import final_stages
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
 from roadeval.runtime.documents import LONGEST, VALUES, read_bounded, read_json
-from roadeval.runtime.text import elided, visible, visible_lines
+from roadeval.runtime.text import elide, visible, visible_lines
 
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
@@ -139,7 +139,19 @@ class FactsFile:
     """Parts that are left out if they are empty."""
     VALUES: ClassVar[int] = VALUES
     """Greatest number of values that are read."""
+    totals: Totals
+    effects: list[Effect]
     run: dict[str, Any]
+
+    @cached_property
+    def finals(self) -> dict[str, str]:
+        """Each scored variant's final stage."""
+        return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
+
+    @property
+    def final_effects(self) -> list[Effect]:
+        """The differences of final masks."""
+        return [effect for effect in self.effects if effect.final]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of the file; undefined numbers become None."""
@@ -284,11 +296,6 @@ class Facts(FactsFile):
         *("cameras", "unlabelled", "estimate", "misfits"),
     )
 
-    @cached_property
-    def finals(self) -> dict[str, str]:
-        """Each scored variant's final stage."""
-        return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
-
     def content(self) -> dict[str, Any]:
         """Return the parts of the file, with differences by the variant that is subtracted.
 
@@ -336,11 +343,6 @@ class Facts(FactsFile):
             }
         except (AttributeError, KeyError, TypeError):
             return {**content, "effects": None}  # the parts tell what is wrong
-
-    @property
-    def final_effects(self) -> list[Effect]:
-        """The differences of final masks."""
-        return [effect for effect in self.effects if effect.final]
 
     @property
     def log_digest(self) -> str | None:
@@ -394,16 +396,6 @@ class FleetFacts(FactsFile):
     warnings: list[str]
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
-
-    @property
-    def finals(self) -> dict[str, str]:
-        """Each scored variant's final stage."""
-        return {variant: stage for variant in self.totals for stage in self.totals[variant]}
-
-    @property
-    def final_effects(self) -> list[Effect]:
-        """The differences, as `Facts` has them."""
-        return self.effects
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
@@ -477,4 +469,4 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     value = str(value) if isinstance(value, Path) else value
-    return elided(value, LONGEST) if isinstance(value, str) and len(value) > LONGEST else value
+    return elide(value, LONGEST) if isinstance(value, str) and len(value) > LONGEST else value

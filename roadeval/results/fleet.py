@@ -27,7 +27,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import is_final, joined, only, values_of
+from roadeval.evaluation.tables import concatenate, is_final, only, values_of
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -53,7 +53,7 @@ from roadeval.results.tables import (
 )
 from roadeval.results.verdict import focus_of
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, check_output, leads_outside, put, sha256_of, writing
+from roadeval.runtime.files import check_output, claim_files, leads_outside, put, sha256_of, writing
 from roadeval.runtime.text import is_utf8, visible
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class FleetFolder:
         tables = (
             of_drive(results, name, drive) for results, drive in zip(folders, chosen, strict=True)
         )
-        return joined([read_table(name, ""), *tables])
+        return concatenate([read_table(name, ""), *tables])
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -348,7 +348,10 @@ class FleetWriter:
         drives must have; any by default.
         """
         # Two commands may replay drives of one folder together.
-        with writing(self.folder, ResultsError), alone(*(self.folder / name for name in FILES)):
+        with (
+            writing(self.folder, ResultsError),
+            claim_files(*(self.folder / name for name in FILES)),
+        ):
             finals, within = self._write_tables(members, asked or {})
             facts = summarise(finals, members, settings, dict(run), within)
             put(self.folder / RUN, run_toml.encode())
@@ -414,7 +417,9 @@ class FleetWriter:
             except ResultsError as error:
                 if again:  # its results are damaged: it is not done
                     made_path(self.folder, drive).unlink(missing_ok=True)
-                raise ResultsError(f"{error.args[0].partition(';')[0]}; {AGAIN}") from error
+                damaged = ResultsError.of(error)
+                damaged.remedy = AGAIN
+                raise damaged from error
         return {
             name: read_parquet([cached_path(self.folder, name, drive) for drive in drives], name)
             for name in ("scores", "worst")

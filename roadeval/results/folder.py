@@ -9,6 +9,7 @@ import hashlib
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
@@ -17,6 +18,7 @@ from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
 from roadeval.results.tables import ResultsError, TableFacts, read_table
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import Content, NewFolder, writing
+from roadeval.runtime.sentence import Sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,8 +112,8 @@ class ResultsWriter:
 
     def explain_errors(self) -> AbstractContextManager[None]:
         """Turn an OSError inside the block into a `ResultsError`."""
-        advice = "; choose another folder with `output.reports`"
-        return writing(self._new.path, ResultsError, advice)
+        remedy = Sentence("choose another folder with {output.reports}")
+        return writing(self._new.path, partial(ResultsError, remedy=remedy))
 
 
 class _Growing:

@@ -16,7 +16,7 @@ from roadeval.data import Doubt, Frame, FrameResult, Tally
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.thresholds import at_levels
 from roadeval.evaluation.score.unlabelled import SIGNS
-from roadeval.evaluation.tables import KEY, MASK, group_rows, is_final, joined, totals
+from roadeval.evaluation.tables import KEY, MASK, concatenate, group_rows, is_final, totals
 from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, TYPES, UNSCORED
 from roadeval.runtime.text import visible
 
@@ -171,7 +171,7 @@ def scores(
     if beyond:
         further = pd.DataFrame([*beyond]).assign(final=True)
         masks = masks.merge(further, on=[*KEY, "variant", "final"], how="left")
-    rows = joined([masks, parts])
+    rows = concatenate([masks, parts])
     order = group_rows(rows, by).ngroup().to_numpy()
     return rows.iloc[np.argsort(order, kind="stable")].reindex(columns=TABLES["scores"].names)
 

@@ -13,6 +13,7 @@ from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import FILTER
 from roadeval.results.facts import FrameAccount
+from roadeval.runtime.sentence import Sentence
 
 FINE: Final = 0.005
 """Levels that differ by less have two digits."""
@@ -119,7 +120,7 @@ def misfit(finding: Finding, period_ms: float | None, remedy: str) -> str:
             ways = ((finding.right, "right", "left"), (finding.down, "down", "up"))
             parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]
             what = f"moved by {' and '.join(parts)}: moved back {_it(verb)} images and truth better"
-    return f"{subject} {verb} {what}. {remedy}"
+    return Sentence("{} {} {}. {}", subject, verb, what, remedy)
 
 
 def _it(verb: str) -> str:

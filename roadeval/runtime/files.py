@@ -51,13 +51,13 @@ def list_paths(paths: Paths) -> list[AnyPath]:
 
 
 @contextmanager
-def writing(place: object, kind: type[Exception], advice: str = "") -> Iterator[None]:
-    """Turn an OSError inside the block into an error of a room: where, why, and what to do."""
+def writing(place: object, kind: Callable[[str], Exception]) -> Iterator[None]:
+    """Turn an OSError inside the block into an error of a room, which ``kind`` makes."""
     try:
         yield
     except OSError as error:
         why = error.strerror or error
-        raise kind(f"{place}: cannot be written: {why}{advice}") from error
+        raise kind(f"{place}: cannot be written: {why}") from error
 
 
 def check_input(path: str | Path) -> None:
@@ -185,7 +185,7 @@ class NewFolder:
     """A folder that is written as ``partial``, and whose files take their places together.
 
     It is written inside the folder with its name. Then the old seal is removed first, and the new
-    one moved last; `claimed_folder` completes the moves of a killed run. If ``path`` is a link, the
+    one moved last; `claim_folder` completes the moves of a killed run. If ``path`` is a link, the
     folder behind it is written; ``content`` lists the files that are replaced.
     """
 
@@ -204,7 +204,7 @@ class NewFolder:
     def publish(self) -> None:
         """Let its files take their places.
 
-        After an OSError the old content is there, or the next `claimed_folder` completes the new.
+        After an OSError the old content is there, or the next `claim_folder` completes the new.
         """
         for file in self.partial.iterdir():
             if (self._target / file.name).is_dir():
@@ -238,44 +238,44 @@ def _settle(moving: Path, content: Content) -> None:
 
 
 @contextmanager
-def claimed_file(path: Path, *, wait: bool = False) -> Iterator[bool]:
-    """Hold the claim on a file to be written, see `claimed`; earlier partial files are removed.
+def claim_file(path: Path, *, wait: bool = False) -> Iterator[bool]:
+    """Hold the claim on a file to be written, see `claim`; earlier partial files are removed.
 
     An OSError if the file cannot be written.
     """
     check_output(path)
     target = target_of(path)
-    with new_folder(target.parent), claimed(target, target.parent, wait=wait) as certain:
+    with new_folder(target.parent), claim(target, target.parent, wait=wait) as certain:
         for left in find_partial(target) if certain else ():
             remove(left)
         yield certain
 
 
 @contextmanager
-def alone(*paths: Path) -> Iterator[None]:
+def claim_files(*paths: Path) -> Iterator[None]:
     """Hold the claims on files; wait while other runs have them."""
     with ExitStack() as claims:
         for path in paths:
-            claims.enter_context(claimed_file(path, wait=True))
+            claims.enter_context(claim_file(path, wait=True))
         yield
 
 
 @contextmanager
-def claimed_folder(path: Path, content: Content) -> Iterator[bool]:
-    """Hold the claim on a folder to be replaced, as `claimed_file` does on a file.
+def claim_folder(path: Path, content: Content) -> Iterator[bool]:
+    """Hold the claim on a folder to be replaced, as `claim_file` does on a file.
 
     The moves that a killed run had begun are completed.
     """
     check_output(path, folder=True)
     target = Path(os.path.realpath(path))
-    with new_folder(target), claimed(target, target) as certain:
+    with new_folder(target), claim(target, target) as certain:
         for left in find_partial(target / target.name) if certain else ():
             _settle(left, content) if left.name.endswith(_MOVING) else remove(left)
         yield certain
 
 
 @contextmanager
-def claimed(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
+def claim(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
     """Hold the claim on an output: a lock of the system on a file in a folder.
 
     The lock ends with the process. All runs that write the output name the same folder. While

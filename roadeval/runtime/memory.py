@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 from typing import Final
 
-LACKING: Final = (
-    "not enough memory: give it more, or let it take less, by fewer `run.jobs` or a smaller "
-    "`frames.scale`"
+from roadeval.runtime.sentence import Sentence
+
+LACKING: Final = Sentence(
+    "not enough memory: give it more, or let it take less, by fewer {run.jobs} or a "
+    "smaller {frames.scale}"
 )
 _LACKING: Final = re.compile(
     "(allocat|map segment|new thread|create thread|Insufficient memory|out of memory|bad_alloc)",

@@ -64,7 +64,7 @@ def visible_lines(text: str) -> str:
     return "\n".join(map(visible, text.split("\n")))
 
 
-def elided(name: str, letters: int) -> str:
+def elide(name: str, letters: int) -> str:
     """Return a name, shortened in the middle if it is long: names differ at both ends."""
     name = visible(name)
     if len(name) <= letters:

@@ -23,10 +23,10 @@ AHEAD: Final = 2
 WATCHED_S: Final = 0.05
 """Seconds between two looks of `time_limit` at the clock."""
 _LOCAL: Final = threading.local()
-"""Holds the event ``stopped`` in a thread of `ordered`."""
+"""Holds the event ``stopped`` in a thread of `map_ordered`."""
 
 
-def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R]:
+def map_ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R]:
     """Yield ``work(item)`` for every item, in the items' order, computed by ``jobs`` threads.
 
     At most ``jobs + 2`` items are taken ahead of the results, so that memory does not grow with
@@ -70,8 +70,8 @@ def time_limit(
 ) -> Iterator[threading.Event]:
     """Call ``end`` if the work within takes longer than some seconds; then the event is set.
 
-    The same happens if the process grows by more than ``grown`` bytes. In a thread of `ordered` a
-    stop calls ``end`` as well, since no exception reaches the code of a library.
+    The same happens if the process grows by more than ``grown`` bytes. In a thread of `map_ordered`
+    a stop calls ``end`` as well, since no exception reaches the code of a library.
     """
     done, late = threading.Event(), threading.Event()
     stopped, until = getattr(_LOCAL, "stopped", done), time.monotonic() + seconds
@@ -95,7 +95,7 @@ def time_limit(
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Keep BLAS and OpenCV from starting threads of their own while `ordered` runs.
+    """Keep BLAS and OpenCV from starting threads of their own while `map_ordered` runs.
 
     They would compete with the threads here: on a busy machine, BLAS threads that spin while they
     wait for each other make an item ten times slower.

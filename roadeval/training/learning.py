@@ -20,7 +20,8 @@ from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.scene import expose_by_patch, reach, scene_of, stretch
 from roadeval.pipeline.stage import Output, TrainingSet, View
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.sentence import Sentence
+from roadeval.runtime.threads import map_ordered
 from roadeval.training.model import Model, load_cached_model
 from roadeval.training.settings import TrainingSettings
 
@@ -37,6 +38,9 @@ class TrainingError(RoadevalError):
     """Frames from which nothing can be learnt."""
 
 
+WITHOUT_TRAINING: Final = Sentence("give {training.model}, or run what learns nothing with {only}")
+
+
 def fit(
     frames: Sequence[Frame],
     pipelines: Pipelines,
@@ -49,7 +53,7 @@ def fit(
     no road at all. The frames have truth, unless ``settings.source`` allows the patch. ``base`` is
     the model of other drives: stages that can learn further do so, the others stay unchanged.
     """
-    learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
+    learning = [name for name, pipeline in pipelines.items() if pipeline.learning_stages()]
     if learning and not frames:
         raise TrainingError("there is no frame to train on in the selected range")
     truths = [frame.truth for frame in frames if frame.truth is not None]
@@ -58,8 +62,11 @@ def fit(
     if len(truths) < len(frames) or (frames and settings.source == "patch"):
         if settings.source == "truth":
             raise TrainingError(
-                "there is no truth to train on: name its topic with `topics.truth`, give "
-                '`training.model`, or allow training.source = "patch"'
+                "there is no truth to train on",
+                remedy=Sentence(
+                    "name its topic with {topics.truth}, give {training.model}, or allow "
+                    'training.source = "patch"'
+                ),
             )
         source, truths = "patch", [patch_truth(frame.image, settings) for frame in frames]
     else:
@@ -72,8 +79,11 @@ def fit(
         if not (pixels := len(drawn.road)):
             raise TrainingError(
                 f"frames {frames[0].number} to {frames[-1].number} do not show both road and "
-                "non-road, so nothing can be learnt from them; choose other frames with "
-                "`frames.start` or `training.frames`, or give `training.model`"
+                "non-road, so nothing can be learnt from them",
+                remedy=Sentence(
+                    "choose other frames with {frames.start} or {training.frames}, or give "
+                    "{training.model}"
+                ),
             )
         images = tuple(frame.image for frame in frames)
         drawn = replace(drawn, images=images, truths=tuple(truths), share=share)
@@ -82,10 +92,10 @@ def fit(
             learnt = base.parameters.get(name, {}) if base else {}
             return fit_stages(frames, drawn, pipelines[name], learnt)
 
-        parameters |= zip(learning, ordered(learn, learning, _AT_ONCE), strict=True)
+        parameters |= zip(learning, map_ordered(learn, learning, _AT_ONCE), strict=True)
     return Model(
         parameters,
-        {name: pipeline.relevant() for name, pipeline in pipelines.items()},
+        {name: pipeline.relevant_settings() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
         pixels,
@@ -102,7 +112,7 @@ def fit_stages(
     its outputs.
     """
     parameters = dict(base)
-    heard = pipeline.heard()
+    heard = pipeline.heard_stages()
     for stage in pipeline.stages():
         settings = pipeline.settings[stage.name]
         if stage.fit is not None and stage.name not in base:
@@ -238,14 +248,12 @@ def from_log(
     ``base`` is a model of other drives, to learn further. With ``picks`` the frames picked by rank
     train.
     """
-    learning = [name for name, pipeline in pipelines.items() if pipeline.learning()]
+    learning = [name for name, pipeline in pipelines.items() if pipeline.learning_stages()]
     if not learning:
         return fit((), pipelines, settings), Schedule(picks=picks)
     if not settings.frames:
-        raise TrainingError(
-            f"`training.frames` is 0, and {', '.join(learning)} must learn: give `training.model`, "
-            "or run what learns nothing with `only`"
-        )
+        problem = f"is 0, and {', '.join(learning)} must learn"
+        raise TrainingError(problem, setting="training.frames", remedy=WITHOUT_TRAINING)
     held, schedule = HeldFrames(on_frame), Schedule()
     if labelled and picks:
         in_range = frames(labelled=True)
@@ -283,15 +291,15 @@ def require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_tr
         learning = [stage for stage in pipeline.stages() if stage.fit is not None]
         if learning and not any(stage.adapt for stage in learning):
             raise TrainingError(
-                f"variant {name}: no stage of it can learn further "
-                f"({', '.join(stage.name for stage in learning)}); use preset robust, or leave "
-                "`training.adapt` out"
+                f"no stage of it can learn further ({', '.join(s.name for s in learning)})",
+                where=f"variant {name}",
+                remedy=Sentence("use preset robust, or leave {training.adapt} out"),
             )
     if not by_truth and settings.source != "patch":
         raise TrainingError(
             "no frame of the range has road truth to adapt the model to, and what the reference "
-            "patch guesses may make it worse: leave `training.adapt` out, or insist with "
-            'training.source = "patch"'
+            "patch guesses may make it worse",
+            remedy=Sentence('leave {training.adapt} out, or insist with training.source = "patch"'),
         )
 
 
@@ -326,8 +334,11 @@ def choose_frames(
         gap = max(1, len(numbers) // max(4 * len(held.frames), 1))
     if lost and not held.frames:
         raise TrainingError(
-            f"none of the {len(lost)} frames to train on can be decoded; the first: "
-            f"{next(iter(lost.values()))}"
+            Sentence(
+                "none of the {} frames to train on can be decoded; the first: {}",
+                len(lost),
+                next(iter(lost.values())),
+            )
         )
     trained = {frame.number for frame in held.frames}
     places = {place for place, number in enumerate(numbers) if number in trained}
@@ -337,9 +348,12 @@ def choose_frames(
     if with_truth and trained and not left:
         raise TrainingError(
             f"the range has {len(numbers)} labelled frames, and training would take {len(trained)} "
-            f"of them and {len(beside)} more as a gap: none is left to evaluate; set "
-            f"`training.frames` to {max(len(numbers) // (2 + 2 * gap), 1)}, give `training.model`, "
-            "or run what learns nothing with `only`"
+            f"of them and {len(beside)} more as a gap: none is left to evaluate",
+            remedy=Sentence(
+                "set {training.frames} to {}, {}",
+                max(len(numbers) // (2 + 2 * gap), 1),
+                WITHOUT_TRAINING,
+            ),
         )
     return Schedule(gap=beside, first=left[0] if left else None)
 
@@ -360,8 +374,12 @@ def from_drives(
     insists = settings.source == "truth" or len(bare) < len(frames)
     if bare and insists and settings.source != "patch":
         raise TrainingError(
-            f"{bare[0]}: no road truth to train on in the range; name its topic with "
-            '`topics.truth`, leave the drive out, or set training.source = "patch"'
+            "no road truth to train on in the range",
+            where=bare[0],
+            remedy=Sentence(
+                "name its topic with {topics.truth}, leave the drive out, or set training.source "
+                '= "patch"'
+            ),
         )
     model = fit([*chain.from_iterable(frames.values())], pipelines, settings)
     if not bare or settings.source == "patch":
@@ -404,8 +422,8 @@ class HeldFrames:
         if self._bytes > GREATEST_MEMORY:
             raise TrainingError(
                 f"training holds its frames decoded, and more than {len(self.frames)} of them "
-                f"would take over {GREATEST_MEMORY >> 20} MiB: lower `training.frames`, or reduce "
-                "them with `frames.scale`"
+                f"would take over {GREATEST_MEMORY >> 20} MiB",
+                remedy=Sentence("lower {training.frames}, or reduce them with {frames.scale}"),
             )
         self.frames.append(frame)
         self._on_frame(len(self.frames))
@@ -433,4 +451,4 @@ def decode_all(
             yield frame.decode()
         except RoadevalError as error:
             if lost is not None:
-                lost[frame.number] = str(error)
+                lost[frame.number] = error.sentence

@@ -76,7 +76,7 @@ class Model:
         Settings that the parameters do not depend on may differ, and a variant that learns nothing
         needs no model.
         """
-        if not pipeline.learning():
+        if not pipeline.learning_stages():
             return
         if variant not in self.settings:
             variants = ", ".join(sorted(self.settings))
@@ -85,7 +85,8 @@ class Model:
                 "train one with the same preset and variants"
             )
         # Through JSON, as in the file, where tuples and lists are the same.
-        relevant, made_for = json.loads(json.dumps(pipeline.relevant())), self.settings[variant]
+        relevant = json.loads(json.dumps(pipeline.relevant_settings()))
+        made_for = self.settings[variant]
         for name in sorted({*made_for, *relevant}):
             there, here = made_for.get(name, {}), relevant.get(name, {})
             if there != here:
@@ -95,7 +96,7 @@ class Model:
                     f"{path}: the model was made for other settings of {name} in variant "
                     f"{variant} ({', '.join(differ)}); train one with the settings of this run"
                 )
-        for name in pipeline.learning():
+        for name in pipeline.learning_stages():
             if name not in self.parameters.get(variant, {}):
                 raise ModelError(
                     f"{path}: the model file is incomplete: {name} of variant {variant} has "

@@ -7,7 +7,9 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval
 
+from roadeval.errors import SettingError
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import Flag
 
 
@@ -50,4 +52,5 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         if self.adapt and self.model is None:
-            raise ValueError("`training.adapt` needs `training.model`, which it builds on")
+            needs = Sentence("needs {model}, which it builds on")
+            raise SettingError(needs, setting="adapt")

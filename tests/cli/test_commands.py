@@ -1,4 +1,4 @@
-"""``roadeval train`` in a terminal."""
+"""The commands `train`, `info` and `replay`: what they hand on, and what they say."""
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ from roadeval.jobs.progress import Progress
 from roadeval.jobs.run.replay import Outcome
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.facts import DriveFacts, FrameAccount
+from roadeval.runtime.sentence import Sentence, Setting
 from tests.fixtures.make import make
 from tests.jobs.making import write_log
 from tests.results.making import facts_of
@@ -28,10 +29,10 @@ def bare(tmp_path, monkeypatch):
 
 def test_the_patch_trains_a_log_without_truth(bare, capsys):
     assert main(["train", "bare.mcap", "--config", "patch.toml", "-o", "m.model"]) == 0
-    told = capsys.readouterr()
-    assert "m.model: filtered, unfiltered; trained on 3 frames" in told.out
-    assert told.out.endswith("pixels, by the patch\n")
-    assert "guess" not in told.err
+    streams = capsys.readouterr()
+    assert "m.model: filtered, unfiltered; trained on 3 frames" in streams.out
+    assert streams.out.endswith("pixels, by the patch\n")
+    assert "guess" not in streams.err
 
 
 def test_what_holds_for_one_drive_is_read_from_a_manifest(tmp_path, monkeypatch, capsys):
@@ -41,9 +42,9 @@ def test_what_holds_for_one_drive_is_read_from_a_manifest(tmp_path, monkeypatch,
     write_log(tmp_path / "ids.mcap", codes=(5, 3))
     words = ["train", "mask.mcap", "ids.mcap", "-o", "m.model", "--train-frames", "2"]
     assert main([*words, "ids.toml"]) == 0
-    told = capsys.readouterr()
-    assert "by the truth" in told.out
-    assert "warning" not in told.err
+    streams = capsys.readouterr()
+    assert "by the truth" in streams.out
+    assert "warning" not in streams.err
     assert main(words) == 1
     assert "ids.mcap: /truth/road holds the values 3 5" in capsys.readouterr().err
 
@@ -52,9 +53,9 @@ def test_what_was_left_out_is_told_and_decides_the_exit_code(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     write_log(tmp_path / "broken.mcap", broken=8)
     assert main(["train", "broken.mcap", "-o", "m.model", "--train-frames", "3", "-q"]) == 3
-    told = capsys.readouterr().err
-    assert "roadeval: lost: frame 8: 8 bytes that are no image" in told
-    assert "roadeval: lost: 1 of 3 training frames could not be decoded" in told
+    stderr = capsys.readouterr().err
+    assert "roadeval: lost: frame 8: 8 bytes that are no image" in stderr
+    assert "roadeval: lost: 1 of 3 training frames could not be decoded" in stderr
     assert (tmp_path / "m.model").exists()
 
 
@@ -85,9 +86,9 @@ def folder(tmp_path):
 def test_images_and_masks_become_one_log(folder, capsys):
     words = ["pack", f"{folder}/imgs", "--truth", f"{folder}/masks", "-o", f"{folder}/d.mcap"]
     assert main(words) == 0
-    said = capsys.readouterr()
-    assert "d.mcap: 3 images, 2 with a mask; 10 images a second" in said.out
-    assert "images without a mask: 2.jpg" in said.err
+    streams = capsys.readouterr()
+    assert "d.mcap: 3 images, 2 with a mask; 10 images a second" in streams.out
+    assert "images without a mask: 2.jpg" in streams.err
     main(["info", f"{folder}/d.mcap"])
     assert "truth: /truth/road" in capsys.readouterr().out
 
@@ -142,20 +143,20 @@ FACTS = facts_of(
 
 
 @pytest.fixture
-def asked(monkeypatch):
-    """What the main job was asked for; it does nothing and is done at once."""
-    asked = {"warnings": (), "losses": ()}
+def job(monkeypatch):
+    """The arguments of the main job, which does nothing, and what it returns."""
+    job = {"warnings": (), "losses": ()}
 
     def replay(drive, config, *, on_progress):
-        asked.update(drive=drive, config=config)
+        job.update(drive=drive, config=config)
         on_progress(Progress(3, 3, "replaying"))
-        return Outcome(None, None, FACTS, asked["warnings"], asked["losses"], ())
+        return Outcome(None, None, FACTS, job["warnings"], job["losses"], ())
 
     monkeypatch.setattr("roadeval.jobs.run.replay.replay", replay)
-    return asked
+    return job
 
 
-def test_every_option_arrives(asked, tmp_path):
+def test_every_option_arrives(job, tmp_path):
     settings = tmp_path / "narrow.toml"
     settings.write_text("[shadow]\nring_width = 3\n")
     words = (
@@ -167,7 +168,7 @@ def test_every_option_arrives(asked, tmp_path):
         "--every 2 --max-frames 7 --record none --jobs 1"
     )
     assert main(words.split()) == 0
-    assert asked["config"] == configure(
+    assert job["config"] == configure(
         {
             "preset": "printed",
             "shadow": {"ring_width": 3},
@@ -189,7 +190,7 @@ def test_every_option_arrives(asked, tmp_path):
     )
 
 
-def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
+def test_a_preset_that_is_not_the_file_s_is_refused(job, tmp_path, capsys):
     (tmp_path / "c.toml").write_text('preset = "gated"\n')
     words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--preset"]
     assert main([*words, "gated"]) == 0
@@ -208,8 +209,8 @@ def test_a_model_and_training_frames_do_not_go_together(capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--road-label 3 --road-label 70000", "--road-label, item 2: must be at most 65535"),
-        (f"--road-label {'9' * 5000}", "--road-label, item 1: must be a whole number"),
+        ("--road-label 3 --road-label 70000", "--road-label: item 2 must be at most 65535"),
+        (f"--road-label {'9' * 5000}", "--road-label: item 1 must be a whole number"),
         ("--every 0", "--every: must be at least 1 (given: 0)"),
     ],
 )
@@ -218,10 +219,10 @@ def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
     assert f"roadeval: error: {said}" in capsys.readouterr().err
 
 
-def test_every_option_s_words_are_a_setting_s_value(asked):
+def test_every_option_s_words_are_a_setting_s_value(job):
     """The help's flags and the settings' names belong together, each once."""
     assert main(["replay", "d.mcap", "--model", "city.model"]) == 0
-    assert asked["config"].training.model == "city.model"
+    assert job["config"].training.model == "city.model"
     flags = [flag for option in OPTIONS for flag in option.flags]
     assert len({*flags}) == len(flags)
     for option in OPTIONS:
@@ -232,32 +233,29 @@ def test_every_option_s_words_are_a_setting_s_value(asked):
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("lower `training.frames` or `frames.scale`", "lower --train-frames or --scale"),
-        ("name it with `topics.truth`.", "name it with --truth-topic."),
-        ("a.toml: frames.every: bad", "a.toml: frames.every: bad"),
-        ("output.mcap: No such file", "output.mcap: No such file"),
-        ("`training.source` has no flag", "`training.source` has no flag"),
-        ("`masks` my-net: bad", "--masks my-net: bad"),
-        (
-            "`masks.my-net.labels.road` is missing",
-            "`labels.road` in the file of --masks my-net=FILE.toml is missing",
-        ),
+        ("lower {training.frames} or {frames.scale}", "lower --train-frames or --scale"),
+        ("a `topics.truth` that is text", "a `topics.truth` that is text"),
+        ("{training.source} has no flag", "`training.source` has no flag"),
+        ("{masks} my-net: bad", "--masks my-net: bad"),
+        (Setting("masks.my-net.first"), "`first` in the file of --masks my-net=FILE.toml"),
+        (Setting("topics.masks.net"), "--mask-topic net"),
     ],
 )
-def test_names_of_settings_become_flags(text, shown):
-    assert with_flags(text) == shown
+def test_settings_in_a_sentence_are_named_by_their_flags(text, shown):
+    sentence = Sentence("{}", text) if isinstance(text, Setting) else Sentence(text)
+    assert with_flags(sentence) == shown
 
 
-def test_warnings_are_told_even_when_quiet(asked, capsys):
-    asked["warnings"] = ("the classifier of filtered calls everything road",)
+def test_warnings_are_told_even_when_quiet(job, capsys):
+    job["warnings"] = ("the classifier of filtered calls everything road",)
     assert main(["replay", "drive.mcap", "--quiet"]) == 0
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err == ("roadeval: warning: the classifier of filtered calls everything road\n")
 
 
-def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
-    asked["losses"] = ("frame 7: its JPEG ends early",)
+def test_a_loss_is_told_and_has_its_exit_code(job, capsys):
+    job["losses"] = ("frame 7: its JPEG ends early",)
     assert main(["replay", "drive.mcap", "--quiet"]) == 3
     assert capsys.readouterr().err == "roadeval: lost: frame 7: its JPEG ends early\n"
 

@@ -1,4 +1,4 @@
-"""However a command ends: one line on stderr, no traceback, and the exit code for it."""
+"""However a command ends: a line on stderr, its exit code; signals, and streams that are closed."""
 
 import errno
 import json
@@ -119,7 +119,7 @@ def test_signals_at_once_are_raised_as_one_exception_that_runs_clean_up(number, 
 
     for place in range(1, times):
         Timer(place * signals.GRACE_S / 2, os.kill, (os.getpid(), number)).start()
-    with pytest.raises(signals.Stopped) as stopped, signals.raised():
+    with pytest.raises(signals.Stopped) as stopped, signals.as_exceptions():
         work()
     assert stopped.value.exit_code == code
     assert tidied == ["closed"]
@@ -134,7 +134,7 @@ def test_a_later_signal_would_end_the_process_at_once():
         finally:
             handlers.extend(map(signal.getsignal, (signal.SIGINT, signal.SIGTERM)))
 
-    with pytest.raises(signals.Stopped), signals.raised():
+    with pytest.raises(signals.Stopped), signals.as_exceptions():
         work()
     assert handlers == [signal.SIG_DFL, signal.SIG_DFL]
 

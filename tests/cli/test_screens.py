@@ -1,4 +1,4 @@
-"""What a replay came to, on a screen."""
+"""The result of a replay on one screen; progress at a terminal and elsewhere."""
 
 import io
 from pathlib import Path
@@ -68,9 +68,9 @@ def lines_of(steps, monkeypatch):
     monkeypatch.setattr(progress.time, "monotonic", clock)
     with Display(get_time=clock, disable=True) as display:
         watch = progress.Watch(display, written.append, lines=True)
-        for seconds, each in steps:
+        for seconds, step in steps:
             clock.seconds = 100 + seconds
-            watch(each)
+            watch(step)
     return written
 
 
@@ -91,7 +91,7 @@ def test_a_line_comes_now_and_then_with_rate_and_time_left(monkeypatch):
 def test_at_a_terminal_there_is_a_bar(monkeypatch):
     screen = Console(file=io.StringIO(), force_terminal=True, width=80)
     monkeypatch.setattr(console, "diagnostics", lambda: screen)
-    with progress.watched() as watch:
+    with progress.show() as watch:
         watch(step(40, 100))
         watch(step(50, 100))
         watch(step(60, 100))

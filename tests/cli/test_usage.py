@@ -1,4 +1,4 @@
-"""What can be seen to be wrong without opening a file is wrong usage: exit code 2."""
+"""Wrong usage, which no file can change: exit code 2; help and version at once."""
 
 import os
 import subprocess
@@ -49,7 +49,7 @@ def test_a_mistyped_command_is_guessed(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["inspect", "a.rrd", "--frame", "1", "--worst", "2"], "give --frame or --worst, not both"),
         (
@@ -58,7 +58,7 @@ def test_a_mistyped_command_is_guessed(capsys):
         ),
         (
             ["replay", "a.mcap", "--ignore-label", "3"],
-            "--ignore-label needs --road-label: name the values that mean road",
+            "--ignore-label: needs --road-label; name the values that mean road",
         ),
         (
             ["replay", "a.mcap", "--variant", "mine"],
@@ -68,11 +68,11 @@ def test_a_mistyped_command_is_guessed(capsys):
     ],
 )
 def test_options_that_do_not_go_together_are_told_without_calling_a_value_invalid(
-    words, said, capsys
+    words, message, capsys
 ):
     assert main(words) == 2
-    told = f"roadeval: error: {said}; see 'roadeval {words[0]} --help'\n"
-    assert capsys.readouterr().err == told
+    line = f"roadeval: error: {message}; see 'roadeval {words[0]} --help'\n"
+    assert capsys.readouterr().err == line
 
 
 UNREADABLE = {

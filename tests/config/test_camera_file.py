@@ -82,13 +82,13 @@ def test_of_several_cameras_the_topic_of_the_images_tells_which(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (yaml.dump({"cam0": {**FRONT, "camera_model": "omni"}}), "cam0 is of the model omni"),
-        (OST.replace("-0.3", ".nan"), "ground.distortion, item 1"),
-        (OST.replace("560.5", "-1"), "ground.focal, item 1"),
+        (OST.replace("-0.3", ".nan"), "ground.distortion: item 1"),
+        (OST.replace("560.5", "-1"), "ground.focal: item 1"),
         (OST.replace("560.5", "fx"), "no camera as ROS's camera_calibration"),
-        (OST.replace("image_width: 640", "image_width: [640]"), "ground.size, item 1"),
+        (OST.replace("image_width: 640", "image_width: [640]"), "ground.size: item 1"),
         (OST.replace("  data: [560.5", "  dates: [560.5"), "no camera as ROS's camera_calibration"),
         (yaml.dump({"cam0": {**FRONT, "intrinsics": []}}), "no camera as ROS's"),
         ("- 1\n- 2\n", "no camera as ROS's camera_calibration"),
@@ -100,8 +100,8 @@ def test_of_several_cameras_the_topic_of_the_images_tells_which(tmp_path: Path):
         ("a: [1\nb: }", "cannot be read as YAML"),
     ],
 )
-def test_what_is_no_camera_is_refused_in_one_line(tmp_path: Path, text: str, said: str):
+def test_what_is_no_camera_is_refused_in_one_line(tmp_path: Path, text: str, message: str):
     with pytest.raises(ConfigError) as error:
         given(tmp_path, text)
-    assert said in str(error.value).replace("`", "")
+    assert message in str(error.value).replace("`", "")
     assert "\n" not in str(error.value)

@@ -1,13 +1,15 @@
-"""The configuration of a run: presets, overriding, variants, and what is refused."""
+"""The configuration of a run: presets, variants, what is refused, and its file that runs again."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from roadeval.config.run import RunConfig, configure, load_config
+from roadeval.cli.options import OPTIONS
+from roadeval.config.run import RunConfig, config_toml, configure, load_config, run_toml
 from roadeval.config.settings import SECTIONS
 from roadeval.config.tables import ConfigError
-from roadeval.config.variants import network_variant
+from roadeval.config.variants import PRESETS, network_variant
 from roadeval.data import RESERVED
 from roadeval.pipeline.stages import STAGES
 
@@ -43,25 +45,28 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ("[frames]\nscale = 1.5", r"frames\.scale: .*\(given: 1.5\)"),
         ("[frames]\nstart = 'noon'", "'noon' is no time"),
         ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
-        ("[labels]\nroad_colors = [[1, 2]]", r"labels\.road_colors, item 1: is too short"),
-        ("[labels]\nroad = [3, -40000]", r"labels\.road, item 2: .*\(given: -40000\)"),
+        ("[labels]\nroad_colors = [[1, 2]]", r"labels\.road_colors: item 1 is too short"),
+        ("[labels]\nroad = [3, -40000]", r"labels\.road: item 2 .*\(given: -40000\)"),
         ("[training.patch]\nx = 1", r"training\.patch.x: .*choose bottom, bottom_width, top"),
         ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
         ("chain = [['post']]", r"no stage \['post'\]"),
         ("ring_width = 3", "ring_width is in no table; put it below one of .*shadow"),
-        ("[output]\nsave = 'g.toml'", r"output.save g.toml: name a file that ends in .rrd"),
+        ("[output]\nsave = 'g.toml'", r"output.save: g.toml does not end in .rrd"),
         ("[fleet]\nkeep = 'best:3'", r"fleet\.keep: must be 'all' or 'none'"),
         (
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = [3, -1]",
-            r"net\.road, item 2: must be at least 0",
+            r"net\.road: item 2 must be at least 0",
         ),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
-        ("[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5", "output.mcap and frames.scale do not"),
+        (
+            "[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5",
+            "output.mcap: does not go with frames.scale",
+        ),
         ("[topics.masks]\ntruth = '/x'", "variant 'truth': the name is reserved"),
         ("variants = 3", r"\[variants\] must hold a table for each variant"),
         ("[variants]\nwide = 3", r"\[variants.wide\] must be a table"),
         ("[variants.wide.svm]\nc = 0", r"\[variants.wide\]: svm\.c: "),
-        ("[variants.wide.training]\nframes = 3", r"\[training\] holds for the whole run"),
+        ("[variants.wide.training]\nframes = 3", r"\[training\] applies to all variants"),
         ("[variants.filtered]\nchain = ['svm', 'post']", "the name is taken"),
         ("chain = ['svm', 'blur', 'post']", r"no stage 'blur'; choose .*shadow"),
         ("chain = ['svm']", "chain must end with post"),
@@ -137,15 +142,15 @@ def test_no_stage_is_called_like_a_table_of_the_run():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("size = [8, 8]\n", "file must name the network"),
         ('file = "n.onnx"\nsise = [8, 8]\n', r"net\.sise: there is no such setting"),
-        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold says nothing"),
+        ('file = "n.onnx"\nthreshold = 0.3\ndecide = "trained"\n', "threshold has no effect"),
     ],
 )
-def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, said):
-    with pytest.raises(ConfigError, match=said) as caught:
+def test_settings_of_a_network_name_its_file_and_nothing_unknown(tmp_path, text, message):
+    with pytest.raises(ConfigError, match=message) as caught:
         network_variant("mine", str(write(tmp_path, text)))
     assert str(tmp_path / "c.toml") in str(caught.value)
 
@@ -156,14 +161,14 @@ def test_an_empty_topic_is_that_of_every_camera_but_of_those_that_name_one(name,
     named = {name: taken} if taken else {}
     cameras = [{"image": f"/{side}", **named} for side in ("left", "right")]
     config = configure({"topics": {name: ""}, "cameras": cameras})
-    assert {getattr(each.topics, name) for each in config.by_camera().values()} == {taken}
+    assert {getattr(camera.topics, name) for camera in config.by_camera().values()} == {taken}
 
 
 def test_masks_are_those_of_the_drive():
     config = configure({"masks": {"net": {"path": "net/{drive}", "threshold": 0.4}}})
     assert config.for_drive("logs/a.mcap").masks["net"].path == "net/a"
-    own = config.of_drive({"masks": {"net": {"path": "elsewhere"}}}).masks["net"]
-    assert (own.path, own.threshold) == ("elsewhere", 0.4)
+    masks = config.of_drive({"masks": {"net": {"path": "elsewhere"}}}).masks["net"]
+    assert (masks.path, masks.threshold) == ("elsewhere", 0.4)
 
 
 def test_what_holds_for_the_whole_run_is_refused_of_a_drive():
@@ -188,3 +193,127 @@ def test_bad_masks_are_named(table, message):
 def test_masks_without_a_path_are_refused_with_the_drive():
     with pytest.raises(ConfigError, match=r"\[masks.net\] has no path"):
         configure({"masks": {"net": {"threshold": 0.5}}}).for_drive("a.mcap")
+
+
+OTHER = {
+    "output.save": "out.rrd",
+    "output.reports": "tables",
+    "output.mcap": "masks.mcap",
+    "output.record": "worst:7",
+    "preset": "gated",
+    "variants": {"wide": {"preset": "printed", "shadow": {"ring_width": 3}}},
+    "cameras": [{"image": "/left/image", "name": "left", "masks": {"net": "/net"}}],
+    "training.model": "city.model",
+    "training.adapt": True,
+    "training.frames": 4,
+    "training.placement": "spread",
+    "training.gap": 2,
+    "only": ["unfiltered"],
+    "truth.path": "labels/{drive}",
+    "truth.pair": "stamp",
+    "truth.first": 1,
+    "truth.names": "left_*",
+    "truth.skip_roadless": True,
+    "truth.images": "frames/{drive}",
+    "topics.image": "/left/image",
+    "topics.frame_id": "left",
+    "topics.truth": '/a "quoted" topic',
+    "topics.shadow": "/shadow",
+    "topics.masks": {"net": "/net/mask"},
+    "topics.sync_tolerance_ms": 2.5,
+    "topics.sync_offset_ms": -37_000.0,
+    "topics.resize_truth": True,
+    "labels.road": [3, "lane marking"],
+    "labels.ignore": [11],
+    "labels.road_colors": [[128, 64, 128]],
+    "labels.ignore_colors": [[0, 0, 0]],
+    "masks": {"net": {"path": "net/{drive}", "threshold": 0.4}},
+    "frames.start": "2013-05-01T12:00:00Z",
+    "frames.end": "90",
+    "frames.every": 3,
+    "frames.labelled": True,
+    "frames.max_frames": 50,
+    "frames.scale": 0.5,
+    "frames.max_pixels": 1_000_000,
+    "frames.unturned": True,
+    "frames.white": 4095.0,
+    "frames.full_range": True,
+    "ground": {"height": 1.4, "pitch": 1.2, "focal": [485.0]},
+    "run.jobs": 1,
+    "run.patience_s": 5.0,
+    "fleet.folds": 5,
+    "fleet.keep": "all",
+    "fleet.scheduler": "tcp://host:8786",
+}
+"""A value other than the default for every option of the command line."""
+
+NEEDS = {
+    "training.adapt": {"training": {"model": "city.model"}},
+    "labels.ignore": {"labels": {"road": [3]}},
+    "labels.ignore_colors": {"labels": {"road_colors": [[1, 1, 1]]}},
+}
+
+
+def tables(setting: str) -> dict:
+    table, _, key = setting.partition(".")
+    made = {table: {key: OTHER[setting]} if key else OTHER[setting]}
+    for name, more in NEEDS.get(setting, {}).items():
+        made[name] = {**more, **made.get(name, {})}
+    return made
+
+
+def test_every_option_is_tried_here():
+    # In a file a network is a variant like others, and so is a tuned one.
+    options = {option.setting for option in OPTIONS} - {"config", "nets", "tunes"}
+    assert OTHER.keys() == options | {"topics.image"}  # of which `cameras` has one or more
+
+
+@pytest.mark.parametrize("setting", OTHER)
+@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
+def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tmp_path):
+    config = configure(tables(setting))
+    assert config != RunConfig()
+    (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
+    assert load_config(tmp_path / "run.toml") == config
+
+
+@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
+def test_a_tuned_network_reads_back_from_the_file_of_a_run(write, tmp_path):
+    (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = [1, 3]\n')
+    config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
+    config = config.with_tuned(["mine"])
+    (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
+    assert load_config(tmp_path / "run.toml") == config
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_reads_back_from_its_file(preset, tmp_path):
+    config = configure({"preset": preset})
+    for text in (run_toml(config, "d", "1"), config_toml(config)):
+        (tmp_path / "run.toml").write_text(text)
+        assert load_config(tmp_path / "run.toml") == config
+
+
+def test_every_setting_is_documented_with_its_range():
+    text = config_toml(configure({"variants": {"gated": {"preset": "gated"}}}))
+    lines = text.splitlines()
+    undocumented = [
+        line
+        for before, line in pairwise(lines)
+        if (" = " in line or line.endswith(" =")) and not before.startswith("#")
+    ]
+    assert undocumented == ['preset = "gated"']
+    assert "Default: one per CPU core. At least 1, at most 1000.\n# jobs =\n" in text
+    assert "One of auto, truth, patch.\nsource" in text.replace("\n# ", " ")
+    assert "Above 0, at most 1.\nscale = 1.0\n" in text
+    assert "``" not in text
+    assert max(map(len, lines)) <= 100
+
+
+@pytest.mark.parametrize("table", ["", "[variants.theirs]\n"])
+def test_a_file_that_the_user_has_not_named_loads_no_code(tmp_path, table):
+    path = tmp_path / "run.toml"
+    path.write_text(f'{table}chain = ["tests.pipeline.somebody:lower_half", "post"]\n')
+    assert load_config(path)
+    with pytest.raises(ConfigError, match=r"run.toml: its chain names code, tests\.pipeline\.some"):
+        load_config(path, trusted=False)

@@ -11,18 +11,18 @@ from roadeval.data.words import DASH, MINUS, percent, points
 
 
 @pytest.mark.parametrize(
-    ("fraction", "told"), [(0.24161, "24.16"), (0.0, "0.00"), (math.nan, DASH), (None, DASH)]
+    ("fraction", "text"), [(0.24161, "24.16"), (0.0, "0.00"), (math.nan, DASH), (None, DASH)]
 )
-def test_a_rate_is_in_percent_and_undefined_is_a_dash(fraction, told):
-    assert percent(fraction) == told
+def test_a_rate_is_in_percent_and_undefined_is_a_dash(fraction, text):
+    assert percent(fraction) == text
 
 
 @pytest.mark.parametrize(
-    ("difference", "told"),
+    ("difference", "text"),
     [(0.0119, "+1.19"), (-0.0119, f"{MINUS}1.19"), (0.0, "0.00"), (-0.00001, "0.00"), (None, DASH)],
 )
-def test_a_difference_has_its_sign_unless_it_is_nothing(difference, told):
-    assert points(difference) == told
+def test_a_difference_has_its_sign_unless_it_is_nothing(difference, text):
+    assert points(difference) == text
 
 
 # --- The threshold that errs least, against trying each -------------------------------------------
@@ -38,12 +38,12 @@ def pixels(seed, levels):
 @pytest.mark.parametrize("levels", [3, 255, 60000])
 def test_no_other_threshold_errs_less(levels):
     codes, truth = pixels(levels, levels)
-    known = truth != IGNORE
+    labelled = truth != IGNORE
     counts = histogram(codes, truth)
-    every = [((codes > code) != (truth == 1))[known].sum() for code in range(0, CODES, 97)]
+    every = [((codes > code) != (truth == 1))[labelled].sum() for code in range(0, CODES, 97)]
     assert wrong_above(counts)[::97].tolist() == every
     best = best_code(counts)
-    assert ((codes > best) != (truth == 1))[known].sum() <= min(every)
+    assert ((codes > best) != (truth == 1))[labelled].sum() <= min(every)
 
 
 def test_of_thresholds_that_err_alike_it_is_the_middle_one():

@@ -19,10 +19,10 @@ def without_workers(monkeypatch):
     """Let ``fleet`` do its tasks in this process: Dask's workers take seconds to begin."""
 
     @contextmanager
-    def started(*_):
+    def start_workers(*_):
         yield Here(), 1
 
-    monkeypatch.setattr("roadeval.jobs.run.fleet.started", started)
+    monkeypatch.setattr("roadeval.jobs.run.fleet.start_workers", start_workers)
 
 
 @pytest.fixture(scope="session")

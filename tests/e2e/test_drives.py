@@ -1,4 +1,4 @@
-"""Whole drives, from the log to the tables, with the numbers they must give."""
+"""Whole drives, from the log to tables and recording, with the numbers they must give."""
 
 import json
 import subprocess

@@ -224,7 +224,7 @@ def test_a_scheduler_that_does_not_answer_is_one_line(drives, tmp_path, monkeypa
     words = ["fleet", str(drives), "-o", str(tmp_path / "f"), "-q"]
     assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 1
     said = capsys.readouterr().err
-    assert said.startswith("roadeval: error: --scheduler tcp://127.0.0.1:9: does not answer")
+    assert said.startswith("roadeval: error: --scheduler: tcp://127.0.0.1:9 does not answer")
     assert said.count("\n") == 1
 
 

@@ -15,7 +15,7 @@ import roadeval
 from roadeval.fleet import remote
 from roadeval.recording import viewer
 from roadeval.results.facts import digest_of
-from roadeval.runtime.files import claimed
+from roadeval.runtime.files import claim
 from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here, write
 from tests.fleet.serving import Server
@@ -206,7 +206,7 @@ def test_the_fleets_own_command_writes_through_no_link(fleet, made, name):
 def test_a_claim_overwrites_nothing_that_a_link_leads_to(tmp_path):
     (tmp_path / "mine").write_text("mine")
     (tmp_path / ".out.lock").symlink_to(tmp_path / "mine")
-    with pytest.raises(OSError, match="symbolic"), claimed(tmp_path / "out", tmp_path):
+    with pytest.raises(OSError, match="symbolic"), claim(tmp_path / "out", tmp_path):
         pytest.fail("it is claimed")
     assert (tmp_path / "mine").read_text() == "mine"
 
@@ -221,7 +221,7 @@ def test_a_drives_url_is_not_asked(fleet, server):
     url = server.url("whole/a.mcap?sig=geheim", user="me:geheim@")
     change(fleet, "source", url)
     runs, said, _ = looked_into(fleet)
-    assert server.asked == []
+    assert server.requests == []
     assert runs["worst"].returncode == 1
     assert f"make it with: roadeval replay {server.url('whole/a.mcap')} " in runs["worst"].stderr
     assert PASSWORD not in said

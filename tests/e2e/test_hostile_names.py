@@ -1,15 +1,17 @@
 """Names from a log, a file or a command line reach no output as they are.
 
 They hold what terminals, Typst, Markdown, Matplotlib, spreadsheets and TOML act upon, and are long,
-empty, or not UTF-8.
+empty, or not UTF-8. Documents and input that are bad are refused in one line, at once.
 """
 
 import hashlib
 import json
+import os
 import re
 import shutil
 import time
 import tomllib
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -24,7 +26,7 @@ from roadeval.results.facts import digest_of
 from roadeval.runtime.text import as_markdown, visible
 from tests.e2e.commands import here
 from tests.fixtures.figures import drawn
-from tests.jobs.making import NS
+from tests.jobs.making import NS, write_log
 from tests.results.fleet.making import fleet_of
 from tests.training.making import frame
 
@@ -245,3 +247,91 @@ def test_a_fleets_table_that_unpacks_to_too_much_is_refused(fleet, column, value
         from roadeval.results.tables import read_parquet
 
         assert len(read_parquet([path], "drives")) == rows
+
+
+POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a2146\nsize 12345\n"
+NESTED = "a = " + "[" * 1_000 + "]" * 1_000
+
+
+@pytest.fixture
+def turned_away(tmp_path, monkeypatch):
+    """Run a command beside a sound log; returns the one line. Nothing may be left behind."""
+    monkeypatch.chdir(tmp_path)
+    write_log(tmp_path / "drive.mcap")
+
+    def turned_away(words):
+        before = {*tmp_path.rglob("*")}
+        done = here(*words.split(), cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.startswith("roadeval: error: ")
+        assert done.stderr.count("\n") == 1
+        assert {*tmp_path.rglob("*")} == before
+        return done.stderr
+
+    return turned_away
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("replay pipe", "info pipe", "train pipe -o m.model", "replay drive.mcap --model pipe"),
+        *("replay drive.mcap --config pipe", "replay drive.mcap --variant other=pipe"),
+        *("config --config pipe", "report pipe -o out.pdf", "report folder -o out.pdf"),
+        *("inspect pipe --list", "compare pipe pipe", "pack images -o new.mcap"),
+    ],
+)
+def test_a_pipe_is_refused_and_never_waited_for(words, turned_away):
+    for folder in ("folder", "images"):
+        Path(folder).mkdir()
+    for pipe in ("pipe", "folder/summary.json", "images/0.png"):
+        os.mkfifo(pipe)
+    assert "is a pipe, not a file" in turned_away(words)
+
+
+def test_a_device_is_refused_before_it_is_read(turned_away):
+    line = turned_away("replay drive.mcap --config /dev/null")
+    assert "/dev/null: cannot be read: is a device" in line
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("config --config it.toml", "config --variant v=it.toml", "config --net n=it.toml"),
+        *("config --masks m=it.toml", "fleet it.toml -o f"),
+    ],
+)
+def test_toml_that_nests_too_deep_is_one_line(words, turned_away):
+    Path("it.toml").write_text(NESTED)
+    assert "it.toml: cannot be read as TOML: " in turned_away(words)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a.mcap", "replay a.mcap"),
+        ("labels/0000.png", "replay drive.mcap --truth labels"),
+        ("labels/0000.txt", "replay drive.mcap --truth labels --road-label road"),
+        ("coco.json", "replay drive.mcap --truth coco.json --road-label road"),
+        ("cvat.xml", "replay drive.mcap --truth cvat.xml --road-label road"),
+        ("masks/0000.png", "replay drive.mcap --masks mine=masks"),
+        ("masks/0000.npy", "replay drive.mcap --masks mine=masks"),
+        ("net.onnx", "replay drive.mcap --net mine=net.onnx"),
+        ("net.toml", "replay drive.mcap --net mine=net.toml"),
+        ("run.toml", "replay drive.mcap --config run.toml"),
+        ("camera.toml", "replay drive.mcap --camera camera.toml"),
+        ("city.model", "replay drive.mcap --model city.model"),
+        ("fleet.toml", "fleet fleet.toml -o out"),
+        ("out.rrd", "report out.rrd"),
+        ("results/summary.json", "report results"),
+        ("images/0000.jpg", "pack images -o new.mcap"),
+    ],
+)
+def test_a_pointer_of_git_lfs_is_told_with_the_command_that_fetches_its_file(
+    name, words, turned_away
+):
+    Path(name).parent.mkdir(exist_ok=True)
+    Path(name).write_text(POINTER)
+    line = turned_away(words)
+    assert f"{Path(name).name}: " in line
+    assert "a pointer to a file in Git LFS: git lfs pull" in line

@@ -1,4 +1,4 @@
-"""``roadeval inspect``: the worst frames, and the real viewer at one of them."""
+"""``roadeval inspect`` of a drive and of a fleet: the worst frames, and the viewer at one."""
 
 import json
 import shlex
@@ -181,9 +181,9 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     assert errors == sorted(errors, reverse=True)
     assert len({each["drive"] for each in listed}) == 3
     read = here("inspect", fleet, "--list").stdout
-    assert "(of a drive at most three, a second apart)" in " ".join(read.split())
+    assert "(at most three per drive, a second apart)" in " ".join(read.split())
     assert max(map(len, read.splitlines())) <= 80
-    assert "Where no recording was kept, --worst K says how to make it." in read
+    assert "If a recording was not kept, --worst K says how to make it." in read
 
 
 def test_of_a_drive_that_was_not_kept_the_command_that_makes_its_recording_is_said(

@@ -1,4 +1,4 @@
-"""Several cameras of one log: replayed together, scored apart, and looked at as one drive."""
+"""Several cameras of one log, scored apart and looked at as one drive; errors in metres."""
 
 import json
 from collections.abc import Iterable

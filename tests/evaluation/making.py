@@ -27,7 +27,7 @@ from roadeval.evaluation.comparison.pairing import ComparedDrive, Side
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import joined, rates_of
+from roadeval.evaluation.tables import concatenate, rates_of
 from roadeval.results.schema import TABLES
 from roadeval.results.tables import read_table
 
@@ -117,7 +117,7 @@ def a_result(label: str, *drives: Drive) -> Side:
 
     def table(name: str, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
         parts = (own[name] for about, own in drives if about.key in keys and name in own)
-        return joined([*parts, table_of(name, [])])
+        return concatenate([*parts, table_of(name, [])])
 
     return Side(label, [about for about, _ in drives], table)
 

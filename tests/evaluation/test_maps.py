@@ -1,4 +1,4 @@
-"""Where pixels go wrong over a drive, and what a step changed."""
+"""Where pixels go wrong over a drive, what a step changed, and how long a mask errs."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A drive's score, from its frames to its sums; a frame's health; the paper's claims."""
+"""A drive's score: sums, health, claims, differences, and doubts about frames without truth."""
 
 import math
 
@@ -19,7 +19,7 @@ from roadeval.evaluation.score.unlabelled import (
     sign_of,
 )
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import joined
+from roadeval.evaluation.tables import concatenate
 from tests.evaluation.making import a_frame, a_table, a_variant, pixels, table_of
 from tests.results.making import KEY, frames_of
 
@@ -295,7 +295,7 @@ def test_a_difference_is_the_variant_minus_the_base_on_the_frames_that_both_have
 def test_each_camera_counts_the_same_in_a_difference():
     front = {("filtered", "post"): [12] * 30, ("unfiltered", "post"): [10] * 30}
     rear = {("filtered", "post"): [14] * 10, ("unfiltered", "post"): [10] * 10}
-    rig = joined([a_table(front), a_table(rear, camera="/rear")])
+    rig = concatenate([a_table(front), a_table(rear, camera="/rear")])
     (effect,) = drive_effects(rig, SETTINGS)
     assert (effect.rates["ERR"].units, effect.rates["ERR"].mean) == (40, pytest.approx(0.03))
 

@@ -81,7 +81,7 @@ def test_variants_that_look_like_numbers_keep_their_names_and_order():
 
 def test_each_camera_counts_the_same_in_the_mean_of_a_rig():
     front, rear = a_table({POST: [10, 10, 10]}), a_table({POST: [40]}, camera="/rear")
-    sums = tables.totals(tables.joined([front, rear]), ["camera", "variant", "stage"])
+    sums = tables.totals(tables.concatenate([front, rear]), ["camera", "variant", "stage"])
     (row,) = tables.over_cameras(sums).to_dict("records")
     assert (row["ERR"], row["pooled_ERR"], row["frames"]) == (0.25, 0.175, 4)
 
@@ -98,7 +98,7 @@ def test_nothing_evaluated_is_nothing_in_every_table():
     assert len(tables.pair_rows(NOTHING, NOTHING, ["drive", "frame"])) == 0
     assert len(tables.changes(NOTHING, *("filtered", "unfiltered"))) == 0
     assert len(tables.causes(NOTHING, "filtered")) == 0
-    assert len(tables.joined([NOTHING, NOTHING])) == 0
+    assert len(tables.concatenate([NOTHING, NOTHING])) == 0
     assert tables.by_region(table_of("regions", [])).empty
     assert [*tables.perfect_stages(table_of("oracles", []), NOTHING)] == []
 
@@ -115,7 +115,7 @@ def test_the_last_window_may_be_short():
 def test_a_mask_that_is_missing_on_some_frames_says_how_many_it_has():
     net = counted(*[(1, 1, 1, 1)] * 3, frames=[0, 4, 5])
     whole = a_table({POST: [10] * 7})
-    rows = only(tables.windows(tables.joined([whole, net]), 2), variant="net")
+    rows = only(tables.windows(tables.concatenate([whole, net]), 2), variant="net")
     assert rows[["window", "first_frame", "last_frame", "frames"]].to_numpy().tolist() == [
         [0, 0, 1, 1],
         [2, 4, 5, 2],
@@ -132,7 +132,7 @@ def test_a_window_has_the_mean_of_the_rates_that_are_defined_and_that_of_all_pix
 def test_each_camera_and_each_drive_is_cut_by_itself():
     parts = [a_table({POST: [10] * 3}), a_table({POST: [20] * 3}, camera="/rear")]
     parts += [a_table({POST: [30] * 2}, drive="road")]
-    rows = tables.windows(tables.joined(parts), 2)
+    rows = tables.windows(tables.concatenate(parts), 2)
     found = {
         key: own["frames"].tolist() for key, own in tables.group_rows(rows, ["drive", "camera"])
     }
@@ -161,7 +161,7 @@ def test_the_final_stage_is_post_or_else_the_last():
 
 def test_each_drive_has_its_own_final_stages():
     drives = [a_table({SVM: [1] * 2}), a_table({SVM: [1], POST: [1]}, drive="road")]
-    found = tables.finals(tables.joined(drives))
+    found = tables.finals(tables.concatenate(drives))
     assert [*zip(found["drive"], found["stage"], strict=True)] == [
         *[("street", "svm")] * 2,
         ("road", "post"),
@@ -186,7 +186,7 @@ def test_changes_are_those_of_the_frames_that_both_have_in_their_order():
 
 
 def test_parts_of_one_table_that_know_other_words_are_joined():
-    whole = tables.joined([a_table({POST: [1]}), NOTHING, a_table({("7", "post"): [2]})])
+    whole = tables.concatenate([a_table({POST: [1]}), NOTHING, a_table({("7", "post"): [2]})])
     assert whole["variant"].tolist() == ["filtered", "7"]
     assert whole["variant"].dtype == "category"
 

@@ -1,4 +1,4 @@
-"""A run that is killed, or whose disk is full, at any of its steps on the file system."""
+"""A run or a fleet that is killed, or whose disk is full, at any of its steps on files."""
 
 import os
 import shutil
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import roadeval
-from roadeval.runtime.files import claimed_folder
+from roadeval.runtime.files import claim_folder
 from tests.e2e.test_fleet import Here, tables, write
 from tests.faults import making, steps
 from tests.faults.forking import Forks
@@ -71,7 +71,7 @@ def notes(place):
 
 
 def recover(place):
-    with claimed_folder(place / "reports", making.CONTENT) as certain:
+    with claim_folder(place / "reports", making.CONTENT) as certain:
         assert certain
 
 

@@ -39,7 +39,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, *, body: bool) -> None:
         kind = "whole" if self.server.folder else self.path.strip("/").partition("/")[0]
-        self.server.asked.append((self.command, self.path, dict(self.headers)))
+        self.server.requests.append((self.command, self.path, dict(self.headers)))
         if kind == "hung":
             time.sleep(SLOW)
         elif kind.isdigit():
@@ -77,9 +77,9 @@ class _Handler(BaseHTTPRequestHandler):
         if kind == "weakened" and later:
             headers["ETag"] = f"W/{tag}"
         begin, end, size = 0, len(content), len(content)
-        asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
-        if asked is not None and kind != "early":
-            begin, end = int(asked[1]), int(asked[2]) + 1
+        byte_range = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        if byte_range is not None and kind != "early":
+            begin, end = int(byte_range[1]), int(byte_range[2]) + 1
             size += kind == "grown"
             headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
         length = 1 << 40 if kind == "endless" and body else end - begin
@@ -102,7 +102,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class Server(ThreadingHTTPServer):
-    """The server; ``asked`` holds the requests: method, path and headers.
+    """The server; ``requests`` has the method, path and headers of each request.
 
     With a ``folder`` all its files are served as they should be, whatever stands before their name.
     """
@@ -112,7 +112,7 @@ class Server(ThreadingHTTPServer):
     def __init__(self, folder: Path | None = None) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
         self.folder, self.sent = folder, 0
-        self.asked: list[tuple[str, str, dict[str, str]]] = []
+        self.requests: list[tuple[str, str, dict[str, str]]] = []
         self._thread = Thread(target=self.serve_forever, args=(0.05,), daemon=True)
 
     def url(self, path: str, scheme: str = "http", user: str = "") -> str:

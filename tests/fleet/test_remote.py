@@ -10,10 +10,15 @@ from threading import Timer
 
 import pytest
 
+import roadeval
 from roadeval.errors import RoadevalError
 from roadeval.fleet import remote
-from roadeval.fleet.remote import readable, stamp
+from roadeval.fleet.drives import FleetError
+from roadeval.fleet.remote import open_source, stamp
+from roadeval.logs.log import open_log
 from tests.fleet.serving import CONTENT, SLOW, Server, s3_is_at
+from tests.jobs.making import settings, write_log
+from tests.logs.test_log import write
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +32,7 @@ def server(running, monkeypatch):
     """A server, and a client with little patience."""
     pause = {"init_backoff": timedelta(milliseconds=1), "max_backoff": timedelta(milliseconds=9)}
     monkeypatch.setattr(remote, "RETRIES", {"max_retries": 2, "backoff": pause})
-    running.asked.clear()
+    running.requests.clear()
     return running
 
 
@@ -40,7 +45,7 @@ def s3(server, monkeypatch):
 
 def fetched(url: str, patience_s: float = 20) -> bytes:
     """The bytes of a drive."""
-    return readable(url, patience_s).file.read(len(CONTENT))
+    return open_source(url, patience_s).file.read(len(CONTENT))
 
 
 def refused(url: str) -> str:
@@ -57,7 +62,7 @@ def refused(url: str) -> str:
 def test_what_is_behind_a_url_is_read(server):
     url = server.url("whole/Monday%20rain.mcap")
     assert fetched(url) == CONTENT
-    assert readable(url).path == Path("Monday rain.mcap")
+    assert open_source(url).path == Path("Monday rain.mcap")
 
 
 @pytest.mark.parametrize(
@@ -71,22 +76,22 @@ def test_what_is_behind_a_url_is_read(server):
     ],
 )
 def test_the_name_of_a_file_is_none_of_a_folder_whatever_the_url_says(path, name):
-    from roadeval.fleet.remote import _file_name
+    from roadeval.fleet.remote import file_name
 
-    assert _file_name(f"https://host/{path}") == name
+    assert file_name(f"https://host/{path}") == name
 
 
 def test_a_signed_url_is_asked_with_its_query_and_not_shown_with_it(server):
-    log = readable(server.url("whole/a.mcap?sig=geheim%2F&x=1"))
+    log = open_source(server.url("whole/a.mcap?sig=geheim%2F&x=1"))
     assert (log.path, log.source) == (Path("a.mcap"), server.url("whole/a.mcap"))
-    assert server.asked[0][1] == "/whole/a.mcap?sig=geheim%2F&x=1"
+    assert server.requests[0][1] == "/whole/a.mcap?sig=geheim%2F&x=1"
     message = refused(server.url("403/a.mcap?sig=geheim", user="me:geheim@"))
     assert message == f"{server.url('403/a.mcap')}: the server denies access"
 
 
 def test_user_and_password_of_a_url_are_sent(server):
     fetched(server.url("whole/a.mcap", user="me:ge%40heim@"))
-    header = server.asked[-1][2]["authorization"]
+    header = server.requests[-1][2]["authorization"]
     assert header == f"Basic {b64encode(b'me:ge@heim').decode()}"
 
 
@@ -98,7 +103,7 @@ def test_user_and_password_of_a_url_are_sent(server):
         ("410/a.mcap", "the server cannot give it"),
         ("503/a.mcap", "the server cannot give it"),
         ("unknown/a.mcap", "the server does not state its length"),
-        ("early/a.mcap", "the server gives no parts of files: copy it here"),
+        ("early/a.mcap", "the server gives no parts of files; copy the file here"),
         ("retagged/a.mcap", "it changed while it was read"),
         ("touched/a.mcap", "it changed while it was read"),
         ("grown/a.mcap", "it changed while it was read"),
@@ -131,7 +136,7 @@ def test_a_silent_server_is_waited_for_as_long_as_was_asked(server, path):
 
 def test_a_part_that_breaks_off_goes_on_where_it_broke(server):
     assert fetched(server.url("resumed/a.mcap")) == CONTENT
-    ranges = [headers["range"] for method, _, headers in server.asked if method == "GET"]
+    ranges = [headers["range"] for method, _, headers in server.requests if method == "GET"]
     assert ranges[0] == f"bytes=0-{len(CONTENT) - 1}"
     assert len(ranges) > 1
     assert not ranges[1].startswith("bytes=0-")
@@ -164,7 +169,7 @@ def test_an_endpoint_without_tls_must_be_allowed(s3, monkeypatch):
     [
         ("s3://key:geheim@bucket/a", "s3://bucket/a: credentials are read from the environment"),
         ("s3:///a", "s3:///a: no bucket in it"),
-        ("ftp://me:geheim@host/a", "ftp://host/a: no scheme that is known"),
+        ("ftp://me:geheim@host/a", "ftp://host/a: an unknown scheme"),
     ],
 )
 def test_a_url_that_cannot_be_read_is_refused(url, message):
@@ -193,3 +198,46 @@ def test_an_interrupt_ends_the_wait_for_a_server_at_once(server, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         fetched(server.url("stalled/a.mcap"))
     assert time.monotonic() - begun < SLOW - 1
+
+
+@pytest.fixture
+def files(tmp_path):
+    with Server(tmp_path) as server:
+        yield server
+
+
+def test_a_log_has_one_identity_on_disk_and_at_two_urls(files, tmp_path):
+    path = write(tmp_path / "noise.mcap")
+    with open_log(path) as log:
+        digest = log.digest
+    for url in (files.url("a/noise.mcap"), files.url("b/noise.mcap?signature=5d1c")):
+        with open_log(open_source(url)) as log:
+            assert log.digest == digest
+            assert (log.name, log.source) == ("noise", url.partition("?")[0])
+
+
+def test_a_replay_of_a_url_is_that_of_the_file(files, tmp_path):
+    path = write_log(tmp_path / "drive.mcap")
+    for name, drive in (("disk", path), ("url", files.url("drive.mcap"))):
+        outcome = roadeval.replay(drive, settings(record="none"), reports=tmp_path / name)
+        assert outcome.facts.log.path == str(drive)
+    tables = [(tmp_path / name / "frames.csv").read_text() for name in ("disk", "url")]
+    assert tables[0] == tables[1]
+
+
+def test_only_what_is_needed_is_fetched(files, tmp_path):
+    path = write(tmp_path / "noise.mcap", size=2_000_000, frames=8)
+    with open_log(open_source(files.url("noise.mcap"))) as log:
+        (topic,) = log.topics
+        assert (topic.count, log.digest != "") == (8, True)
+    assert files.sent < path.stat().st_size // 5
+
+
+def test_a_log_that_changes_while_it_is_read_is_named(files, tmp_path):
+    path = write(tmp_path / "noise.mcap")
+    with open_log(open_source(files.url("noise.mcap"))) as log:
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 0xFF
+        path.write_bytes(content)
+        with pytest.raises(FleetError, match=r"noise\.mcap: it changed while it was read"):
+            log.verify()

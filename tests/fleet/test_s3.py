@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet.drives import find_drives
-from roadeval.fleet.remote import readable, stamp
+from roadeval.fleet.remote import open_source, stamp
 from roadeval.logs.log import open_log
 from tests.fixtures.elsewhere import talker
 from tests.fleet.serving import s3_is_at
@@ -73,7 +73,10 @@ def test_a_stamp_tells_whether_an_object_has_changed(filled, s3):
 
 def test_a_log_in_a_bucket_is_read_by_its_parts(filled, tmp_path):
     (tmp_path / "top.mcap").write_bytes(LOG)
-    with open_log(tmp_path / "top.mcap") as disk, open_log(readable("s3://bucket/top.mcap")) as log:
+    with (
+        open_log(tmp_path / "top.mcap") as disk,
+        open_log(open_source("s3://bucket/top.mcap")) as log,
+    ):
         assert log.digest == disk.digest
         assert log.topics == disk.topics
         assert log.name == "top"

@@ -1,4 +1,4 @@
-"""Which drives words name: logs, folders, rosbag2 folders, globs, URLs, manifests."""
+"""Which drives words name: logs, folders, globs, URLs, manifests; and the folds of them."""
 
 import os
 from dataclasses import replace
@@ -47,18 +47,18 @@ def put_bag(folder: Path) -> None:
 
 
 def manifest(name: str, *drives: str) -> None:
-    """Write a manifest of drives, each by its lines."""
+    """Write a manifest; an argument has the lines of a drive."""
     Path(f"{name}.toml").write_text("".join(f"[[drives]]\n{lines}\n" for lines in drives))
 
 
-def found(*words: str | Path) -> list[str]:
-    """The paths of the drives that words name, below the current folder."""
+def sources(*words: str | Path) -> list[str]:
+    """Return the paths of the drives that words name, below the current folder."""
     return [os.path.relpath(entry.source) for entry in find_drives([str(w) for w in words])]
 
 
 def test_a_file_of_any_name_is_a_drive(folder):
     put("a.mcap", "b.log", "no_suffix")
-    assert found("b.log", "no_suffix", folder / "a.mcap") == ["b.log", "no_suffix", "a.mcap"]
+    assert sources("b.log", "no_suffix", folder / "a.mcap") == ["b.log", "no_suffix", "a.mcap"]
 
 
 @pytest.mark.parametrize("name", ["\u202e!?", "-rf", "..", "x" * 200, "a\nb", "ü", "\udcff"])
@@ -73,21 +73,21 @@ def test_an_identity_is_plain_and_short_whatever_the_name(folder, name):
 
 def test_a_folder_is_searched_through_in_natural_order(folder):
     put("d/drive_10.mcap", "d/drive_2.mcap", "d/b/1.mcap", "d/note.txt", "d/LOUD.MCAP")
-    assert found("d") == ["d/LOUD.MCAP", "d/b/1.mcap", "d/drive_2.mcap", "d/drive_10.mcap"]
+    assert sources("d") == ["d/LOUD.MCAP", "d/b/1.mcap", "d/drive_2.mcap", "d/drive_10.mcap"]
 
 
 def test_hidden_and_incomplete_files_are_left_out_of_a_search(folder):
     put("d/a.mcap", "d/.b.mcap", "d/.c/c.mcap", "d/e.5d1c02fe.partial.mcap", "d/lost+found/f.mcap")
-    assert found("d") == ["d/a.mcap"]
-    assert found("d/*.mcap") == ["d/a.mcap"]
-    assert found("d/.b.mcap") == ["d/.b.mcap"]
+    assert sources("d") == ["d/a.mcap"]
+    assert sources("d/*.mcap") == ["d/a.mcap"]
+    assert sources("d/.b.mcap") == ["d/.b.mcap"]
 
 
 def test_a_split_bag_is_one_drive_in_a_search_and_by_itself(folder):
     put("d/a.mcap")
     put_bag(folder / "d/run")
-    assert found("d") == ["d/a.mcap", "d/run"]
-    assert found("d/run") == ["d/run"]
+    assert sources("d") == ["d/a.mcap", "d/run"]
+    assert sources("d/run") == ["d/run"]
     assert [entry.name for entry in find_drives(["d/run"])] == ["run"]
 
 
@@ -96,24 +96,24 @@ def test_a_split_bag_is_one_drive_in_a_search_and_by_itself(folder):
 )
 def test_files_of_a_bag_are_the_bag(folder, words):
     put_bag(folder / "d/run")
-    assert found(*words) == ["d/run"]
+    assert sources(*words) == ["d/run"]
 
 
 def test_a_folder_that_is_linked_twice_is_searched_once(folder):
     put("d/real/a.mcap")
     (folder / "d/real/again").symlink_to(folder / "d")
     (folder / "d/zlink").symlink_to(folder / "d/real")
-    assert found("d") == ["d/real/a.mcap"]
+    assert sources("d") == ["d/real/a.mcap"]
 
 
 def test_a_glob_matches_files_and_folders(folder):
     put("d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap", "d/2/x.log", "e[1].mcap")
-    assert found("d/*/*.mcap") == ["d/1/a.mcap", "d/2/b.mcap"]
-    assert found("d/**/*.mcap") == ["d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap"]
-    assert found("d/*") == ["d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap"]
-    assert found("d/2/*") == ["d/2/b.mcap", "d/2/c/d.mcap"]
-    assert found("d/2/*.log") == ["d/2/x.log"]
-    assert found("e[1].mcap") == ["e[1].mcap"]
+    assert sources("d/*/*.mcap") == ["d/1/a.mcap", "d/2/b.mcap"]
+    assert sources("d/**/*.mcap") == ["d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap"]
+    assert sources("d/*") == ["d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap"]
+    assert sources("d/2/*") == ["d/2/b.mcap", "d/2/c/d.mcap"]
+    assert sources("d/2/*.log") == ["d/2/x.log"]
+    assert sources("e[1].mcap") == ["e[1].mcap"]
 
 
 def test_a_manifest_says_more_of_a_drive_that_is_named_beside_it(folder):
@@ -130,12 +130,12 @@ def test_cameras_that_are_asked_for_are_those_of_each_drive_that_names_none(fold
         CameraSettings("/front", truth="/front/labels", ground=GroundSettings(height=1.5)),
         CameraSettings("/rear", truth=""),
     )
-    own, named = DriveEntry("a.mcap", "a", "a"), {"topics": {"image": "/top"}, "labels": {}}
-    front, rear = own.of_cameras(cameras)
+    bare, table = DriveEntry("a.mcap", "a", "a"), {"topics": {"image": "/top"}, "labels": {}}
+    front, rear = bare.of_cameras(cameras)
     assert front.settings["topics"] == {"image": "/front", "truth": "/front/labels"}
     assert front.config(RunConfig()).ground.height == 1.5
     assert rear.config(RunConfig()).topics.truth == ""
-    drive = replace(own, settings=named)
+    drive = replace(bare, settings=table)
     assert [*drive.of_cameras(cameras)] == [drive]
 
 
@@ -190,8 +190,8 @@ def test_what_shows_an_entry_shows_no_secret():
         ("empty", r"empty: a folder without \*\.mcap files"),
         ("bags", r"bags: no \*\.mcap file in it; a\.bag is a ROS 1 bag: mcap convert"),
         ("unfinished", "unfinished: no log that is complete"),
-        ("ftp://host/a.mcap", r"ftp://host/a\.mcap: no scheme that is known; choose s3://, gs://"),
-        ("file:///a.mcap", r"file:///a\.mcap: no scheme that is known"),
+        ("ftp://host/a.mcap", r"ftp://host/a\.mcap: an unknown scheme; choose s3://, gs://"),
+        ("file:///a.mcap", r"file:///a\.mcap: an unknown scheme"),
         ("gone.toml", "there is no such file or folder"),
         ("x" * 300, "File name too long"),
     ],
@@ -299,7 +299,7 @@ def test_a_manifest_says_more_of_each_drive(entries, tmp_path):
     first, second = entries(TOML)
     assert (first.path, first.group) == (tmp_path / "a.mcap", "7")
     assert first.tags == {"weather": "rain", "lanes": "2", "wet": "true", "slope": "0.5"}
-    assert (second.path, second.known) == (tmp_path / "b.mcap", (None, {}, {}))
+    assert (second.path, second.description) == (tmp_path / "b.mcap", (None, {}, {}))
 
 
 def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_a_whole(entries):
@@ -337,7 +337,7 @@ def test_settings_of_a_drive_override_those_of_the_run_key_by_key_and_labels_as_
         ("[[drives]]\npath = 'a'\nframes = { evry = 3 }", r"frames\.evry: there is no such"),
         ("[[drives]]\npath = 'a'\nframes = { every = 0 }", r"frames\.every: must be at least 1"),
         ("[[drives]]\npath = 'a'\nlabels = 3", r"labels: must be a table"),
-        ("[[drives]]\npath = 'a'\nlabels = {ignore = [3]}", r"labels\.ignore needs labels\.road"),
+        ("[[drives]]\npath = 'a'\nlabels = {ignore = [3]}", r"ignore: needs drives\.labels\.road"),
         ("[[drives]]\npath = 'a'\ntraining = {}", "training: there is no such setting"),
         ('[[drives]]\npath = "a\\u0000"', "holds a zero byte"),
     ],

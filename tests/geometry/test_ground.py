@@ -30,8 +30,8 @@ PRISM = (-0.2, 0.05, 0.001, 0.002, 0.01, 0.1, 0.0, 0.0, 0.01, -0.02, 0.01, 0.003
 
 
 def made(**settings: object) -> Ground:
-    given = {"height": 1.3, "pitch": 4.0, "roll": 2.0, "focal": (560.0,), **settings}
-    ground, why = ground_of(None, GroundSettings(**given), SIZE)  # type: ignore[arg-type]
+    all_settings = {"height": 1.3, "pitch": 4.0, "roll": 2.0, "focal": (560.0,), **settings}
+    ground, why = ground_of(None, GroundSettings(**all_settings), SIZE)  # type: ignore[arg-type]
     assert ground is not None, why
     return ground
 
@@ -72,9 +72,9 @@ def test_a_polynomial_does_not_bend_far_rays_back_into_the_picture():
     ground = made(model="plumb_bob", distortion=(-0.4, 0.0, 0.0, 0.0))
     beside = np.column_stack([np.full(200, 3.0), np.linspace(-30, 30, 200)])
     seen = ground.pixels(beside)
-    known = np.isfinite(seen).all(axis=1)
-    assert 0 < known.sum() < 200
-    assert np.abs(ground.places(seen[known]) - beside[known]).max() < 1e-3
+    visible = np.isfinite(seen).all(axis=1)
+    assert 0 < visible.sum() < 200
+    assert np.abs(ground.places(seen[visible]) - beside[visible]).max() < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -155,12 +155,12 @@ def test_reduced_images_show_the_same_places_at_reduced_pixels():
 def test_a_homography_is_what_four_corners_say():
     places = np.array([[6.0, 3], [6, -3], [30, 3], [30, -3]])
     seen = made().pixels(places)
-    found, _ = cv2.findHomography(seen, places)
-    alone, _ = ground_of(None, GroundSettings(homography=tuple(found.ravel())), SIZE)
+    homography, _ = cv2.findHomography(seen, places)
+    alone, _ = ground_of(None, GroundSettings(homography=tuple(homography.ravel())), SIZE)
     assert alone.pixels(PLACES) == pytest.approx(made().pixels(PLACES), abs=1e-3)
     with pytest.raises(GroundError, match="homography alone"):
         alone.moved(pitch=1)
-    settings = GroundSettings(homography=tuple(-7 * found.ravel()), focal=(560.0,))
+    settings = GroundSettings(homography=tuple(-7 * homography.ravel()), focal=(560.0,))
     posed, _ = ground_of(None, settings, SIZE)
     assert pose(posed.moved()) == pytest.approx((1.3, 4, 2), abs=1e-4)
 
@@ -173,8 +173,8 @@ def mounted(parent: str, at: tuple[float, ...], pitch: float, yaw: float = 0.0) 
 
 
 def test_transforms_give_angles_and_on_a_footprint_the_height():
-    known = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4, yaw=30)
-    ground, why = ground_of(known, GroundSettings(), SIZE)
+    calibration = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4, yaw=30)
+    ground, why = ground_of(calibration, GroundSettings(), SIZE)
     assert ground.pixels(PLACES) == pytest.approx(made().pixels(PLACES))
     expected = "camera 1.30 m above it, pitch 4.0\N{DEGREE SIGN} down, roll 2.0\N{DEGREE SIGN}"
     covers = "a pixel covers 0.14 m of the way 10 m ahead, 2.2 m at 40"
@@ -182,17 +182,17 @@ def test_transforms_give_angles_and_on_a_footprint_the_height():
 
 
 def test_what_a_file_says_replaces_what_the_log_says():
-    known = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4)
+    calibration = mounted("base_footprint", (1.5, 0.2, 1.3), pitch=4)
     lens = {"model": "plumb_bob", "distortion": LENSES["plumb_bob"]}
-    given = GroundSettings(height=1.5, pitch=3.0, roll=-1.0, **lens)
-    ground, _ = ground_of(known, given, SIZE)
+    settings = GroundSettings(height=1.5, pitch=3.0, roll=-1.0, **lens)
+    ground, _ = ground_of(calibration, settings, SIZE)
     assert pose(ground) == pytest.approx((1.5, 3, -1))
     assert ground.distortion == LENSES["plumb_bob"]
 
 
 def test_a_centre_far_from_the_middle_is_told():
-    given = GroundSettings(height=1.3, pitch=4, focal=(560.0,), centre=(639.5, 479.5))
-    _, why = ground_of(None, given, SIZE)
+    settings = GroundSettings(height=1.3, pitch=4, focal=(560.0,), centre=(639.5, 479.5))
+    _, why = ground_of(None, settings, SIZE)
     assert "its centre, 639.5, 479.5, is far from the middle of 640x480 pixels" in why
 
 
@@ -206,7 +206,7 @@ PLACED = {"height": 1.0, "pitch": 1.0, "fov": 60.0}
 
 
 @pytest.mark.parametrize(
-    ("known", "given", "said"),
+    ("calibration", "fields", "reason"),
     [
         (mounted("base_link", (1.5, 0, 1.3), 4), {}, "height above the ground: the log has it"),
         (mounted("base_footprint", (1.5, 0, -1.3), 4), {}, "above the ground: the log says -1.3 m"),
@@ -221,14 +221,16 @@ PLACED = {"height": 1.0, "pitch": 1.0, "fov": 60.0}
         (None, {"model": "fisheye", "distortion": (0.1,) * 5} | PLACED, "fisheye of 5 numbers"),
     ],
 )
-def test_what_is_missing_is_said(known: Calibration | None, given: dict[str, float], said: str):
-    ground, why = ground_of(known, GroundSettings(**given), SIZE)  # type: ignore[arg-type]
+def test_what_is_missing_is_said(
+    calibration: Calibration | None, fields: dict[str, float], reason: str
+):
+    ground, why = ground_of(calibration, GroundSettings(**fields), SIZE)  # type: ignore[arg-type]
     assert ground is None
-    assert said in why
+    assert reason in why
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("fields", "reason"),
     [
         ({"fov": 60.0, "focal": (500.0,)}, "give one"),
         ({"homography": (1.0, 2.0)}, "nine numbers"),
@@ -237,9 +239,9 @@ def test_what_is_missing_is_said(known: Calibration | None, given: dict[str, flo
         ({"distortion": (1.0,)}, "needs its model"),
     ],
 )
-def test_settings_that_do_not_go_together_are_refused(given: dict[str, float], said: str):
-    with pytest.raises(ValueError, match=said):
-        GroundSettings(**given)  # type: ignore[arg-type]
+def test_settings_that_do_not_go_together_are_refused(fields: dict[str, float], reason: str):
+    with pytest.raises(ValueError, match=reason):
+        GroundSettings(**fields)  # type: ignore[arg-type]
 
 
 def test_a_homography_of_zeros_is_refused():
@@ -248,7 +250,7 @@ def test_a_homography_of_zeros_is_refused():
 
 
 @pytest.mark.parametrize(
-    "given",
+    "fields",
     [
         {"size": (0, 0), "focal": (150.0,)},
         {"size": (-640, -480), "focal": (150.0,)},
@@ -264,9 +266,9 @@ def test_a_homography_of_zeros_is_refused():
         {"homography": (math.nan, *(1.0,) * 8)},
     ],
 )
-def test_a_camera_that_cannot_be_is_refused_by_the_name_of_its_setting(given: dict[str, Any]):
-    with pytest.raises(GroundError, match=rf"^`ground\.{next(iter(given))}`"):
-        ground_of(None, GroundSettings(**given), SIZE)
+def test_a_camera_that_cannot_be_is_refused_by_the_name_of_its_setting(fields: dict[str, Any]):
+    with pytest.raises(GroundError, match=rf"^`ground\.{next(iter(fields))}`"):
+        ground_of(None, GroundSettings(**fields), SIZE)
 
 
 @pytest.mark.parametrize(

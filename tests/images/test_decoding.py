@@ -41,8 +41,8 @@ def test_a_format_without_loss_gives_the_same_pixels(name: str) -> None:
 
 @pytest.mark.parametrize("name", LOSSY)
 def test_a_format_with_loss_gives_pixels_near_by(name: str) -> None:
-    found = to_rgb(LOSSY[name], LIMITS)
-    assert np.abs(found[40:].astype(int) - scene()[40:]).mean() < 4
+    pixels = to_rgb(LOSSY[name], LIMITS)
+    assert np.abs(pixels[40:].astype(int) - scene()[40:]).mean() < 4
 
 
 @pytest.mark.parametrize("name", [*EXACT, *LOSSY])
@@ -133,8 +133,8 @@ def test_a_flipped_bit_of_a_png_is_told_wherever_it_lies(at: int) -> None:
 def test_a_png_of_sixteen_bits_that_lacks_rows_is_damaged() -> None:
     # Its checksums are right: nothing but the number of rows tells.
     for channels in (3, 4):
-        whole = cv2.imencode(".png", np.zeros((5, 4, channels), np.uint16))[1].tobytes()
-        data = png_of_size(4, 6, whole)
+        encoded = cv2.imencode(".png", np.zeros((5, 4, channels), np.uint16))[1].tobytes()
+        data = png_of_size(4, 6, encoded)
         for read in (to_rgb, deep_samples):
             with pytest.raises(ImageError, match="a damaged PNG"):
                 read(data, LIMITS)

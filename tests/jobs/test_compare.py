@@ -1,4 +1,4 @@
-"""Results compared: from fleets' folders and from what single drives left."""
+"""Results compared, and opened as one: from fleets' folders and from what single drives left."""
 
 import importlib
 import re

@@ -175,10 +175,13 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
             "for confidences, their threshold",
         ),
         ({"path": "other.mcap"}, "name a topic of it, as"),
-        ({"path": "other.mcap:/no"}, "topic /no: is not in the log; its image topics are: /seg"),
+        (
+            {"path": "other.mcap:/no"},
+            "/no is not in the log; its image topics are: /seg",
+        ),
         (
             {"path": "other.mcap:/seg", "images": "images"},
-            "is for labels with names: those of",
+            "`masks.net.images`: only labels with names can be paired so",
         ),
     ],
 )

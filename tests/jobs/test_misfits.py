@@ -1,4 +1,4 @@
-"""What does not fit the images is the verdict's first sentence, and its remedy mends it."""
+"""What does not fit the images: told first, with what mends it; frames of several sizes."""
 
 from __future__ import annotations
 
@@ -84,8 +84,9 @@ def test_masks_are_told_with_what_can_be_set_and_no_number_changes(
 
 def test_an_offset_of_stamps_is_refused_where_numbers_pair(places: Path, tmp_path: Path) -> None:
     late = {"path": str(places / "late"), "first": 0}
-    with pytest.raises(RoadevalError, match="sync_offset_ms` is for stamps"):
+    with pytest.raises(RoadevalError, match="only stamps can be moved") as refused:
         verdict(places / "bare.mcap", tmp_path, truth=late, topics={"sync_offset_ms": 100})
+    assert refused.value.setting == "topics.sync_offset_ms"
 
 
 SIZES = ((64, 48), (80, 40), (40, 60))

@@ -64,7 +64,7 @@ def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
         run(drive, tmp_path, variants=variants)
     assert str(caught.value) == (
         "variant mine: stage always_fails failed: KeyError: 'weights' "
-        f"(somebody.py:{line_of('KeyError')}), on each of the first 10 frames (10 to 19): mend it, "
+        f"(somebody.py:{line_of('KeyError')}), on each of the first 10 frames (10 to 19); mend it, "
         "or leave the variant out with `only` filtered `only` unfiltered `only` fine"
     )
     assert "in always_fails" in str(caught.value.__cause__)

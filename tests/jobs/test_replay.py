@@ -1,4 +1,4 @@
-"""The main job, on a small log of our own."""
+"""The main job, on a small log of our own: outputs, identity, training of several."""
 
 import shutil
 from pathlib import Path
@@ -171,10 +171,10 @@ def test_a_run_that_fails_leaves_an_earlier_one_s_partial_recording(drive, tmp_p
 
 def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_warned_of():
     robust = {"variants": {"v": {"preset": "robust"}}}
-    (pixels, most) = roadeval.configure(robust).ignored()
+    (pixels, most) = roadeval.configure(robust).ignored_settings()
     assert "v: preset robust asks for training.pixels_per_class = 1000" in pixels
     assert "training.max_pixels = 50000" in most
-    assert roadeval.configure({"preset": "robust"} | robust).ignored() == ()
+    assert roadeval.configure({"preset": "robust"} | robust).ignored_settings() == ()
 
 
 @pytest.mark.parametrize("table", TABLES)
@@ -313,8 +313,9 @@ def test_a_drive_may_have_labels_of_its_own(drives, tmp_path):
 
 def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
     wrong = described(drives[0], "labels = { road = [4] }")
-    with pytest.raises(RoadevalError, match=r"mask.mcap: `labels.road` 4 does not occur .*0 255$"):
+    with pytest.raises(RoadevalError, match=r"4 does not occur .*0 255$") as refused:
         train([wrong, drives[1]], tmp_path, road=[3])
+    assert (refused.value.where, refused.value.setting) == ("mask.mcap", "labels.road")
 
 
 def test_what_is_lost_of_a_log_is_told(tmp_path):

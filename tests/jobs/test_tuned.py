@@ -316,7 +316,7 @@ def test_a_model_is_refused_with_another_network(folder, tmp_path):
     ("name", "told"),
     [
         ("other", "there is no such method; choose mine"),
-        ("unfiltered", "it learns itself (trees)"),
+        ("unfiltered", "is trained itself (trees)"),
     ],
 )
 def test_what_cannot_be_tuned(folder, name, told):

@@ -1,6 +1,8 @@
-"""Frames and truth out of a log."""
+"""Frames and truth out of a log of every kind of camera; its times, and its identity."""
 
+import hashlib
 import random
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +10,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
-from mcap.writer import CompressionType
+from mcap.writer import CompressionType, Writer
 
-from roadeval.logs.container import records
+from roadeval.logs import log
+from roadeval.logs.container import file, records
+from roadeval.logs.container.records import FileBytes
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.frames import LoggedFrame, Selection
-from roadeval.logs.log import Log, open_log
+from roadeval.logs.log import Log, describe, open_log
 from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings, parse_time
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
@@ -32,16 +36,19 @@ def read(path: Path, **settings: Any) -> tuple[Selection, list[LoggedFrame]]:
 
 
 @pytest.mark.parametrize(
-    ("topics", "reason"),
+    ("topics", "setting", "reason"),
     [
-        ({"image": "/labels", "truth": "/labels"}, "`topics.truth` /labels: it is the image's own"),
-        ({"masks": {"net": "/labels"}}, "`topics.masks` net: /labels is the truth"),
+        ({"image": "/labels", "truth": "/labels"}, "topics.truth", "/labels is the image's own"),
+        ({"masks": {"net": "/labels"}}, "topics.masks.net", "/labels is the truth"),
     ],
 )
-def test_a_topic_is_not_scored_against_itself(tmp_path: Path, topics: Any, reason: str) -> None:
+def test_a_topic_is_not_scored_against_itself(
+    tmp_path: Path, topics: Any, setting: str, reason: str
+) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
-    with pytest.raises(LogError, match=reason):
+    with pytest.raises(LogError, match=reason) as refused:
         read(path, topics=TopicSettings(**topics))
+    assert (refused.value.where, refused.value.setting) == ("drive.mcap", setting)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +67,7 @@ def test_a_range_is_half_open_and_keeps_the_numbers(
 
 
 @pytest.mark.parametrize(
-    ("images", "labels", "stamps", "told"),
+    ("images", "labels", "stamps", "reason"),
     [
         ([10, 20, 30], [12, 22, 32], [10, 20, 30], "in place of them: log times"),
         ([7, 7, 7], [9, 9, 9], [7, 7, 7], "in place of them: their order"),
@@ -68,7 +75,7 @@ def test_a_range_is_half_open_and_keeps_the_numbers(
     ],
 )
 def test_log_times_or_the_order_take_the_place_of_zero_stamps(
-    tmp_path: Path, images: list[int], labels: list[int], stamps: list[int], told: str
+    tmp_path: Path, images: list[int], labels: list[int], stamps: list[int], reason: str
 ) -> None:
     mask = png(grey(255))
     messages = [("/cam", time, compressed(0, jpeg(grey(9)))) for time in images]
@@ -76,7 +83,7 @@ def test_log_times_or_the_order_take_the_place_of_zero_stamps(
     path = ros2_log(tmp_path / "zero.mcap", sorted(messages, key=lambda message: message[1]))
     selection, frames = read(path)
     assert [frame.stamp_ns for frame in frames if frame.labelled] == stamps
-    assert any(told in reason for reason in selection.reasons)
+    assert any(reason in sentence for sentence in selection.reasons)
 
 
 @pytest.mark.parametrize("kind", list(CompressionType))
@@ -112,18 +119,18 @@ def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path, ap
     messages.append(("/camera", 100, compressed(3, jpeg(grey(200)))))  # an old stamp
     path = ros2_log(tmp_path / "a.mcap", sorted(messages, key=lambda message: message[1]))
     (*_, last) = read(path)[1]
-    (told,) = last.accounting.notes
-    assert told.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
+    (note,) = last.accounting.notes
+    assert note.startswith("3 of the 7 images repeat an earlier one, by stamp and content")
 
 
 def chunks_read(log: Log, monkeypatch: pytest.MonkeyPatch) -> set[int]:
     """Return a set that fills with the places of the chunks that are read from now on."""
-    read, whole = set[int](), records.ChunkReader.read
+    read, read_chunk = set[int](), records.ChunkReader.read
     log.containers[0].reader._cache.clear()
 
     def noted(reader: records.ChunkReader, chunk: records.Chunk) -> records.Bytes:
         read.add(chunk.offset)
-        return whole(reader, chunk)
+        return read_chunk(reader, chunk)
 
     monkeypatch.setattr(records.ChunkReader, "read", noted)
     return read
@@ -136,16 +143,18 @@ def test_labelled_frames_are_found_by_their_labels_alone(tmp_path, apart, delay,
     image, mask = jpeg(grey(9)), grey(0)
     mask[3:] = 255
     messages = [("/camera", stamp, compressed(stamp, image)) for stamp in stamps]
-    messages += [("/labels", each + delay, raw(each, mask, "mono8")) for each in stamps[3::apart]]
+    messages += [
+        ("/labels", stamp + delay, raw(stamp, mask, "mono8")) for stamp in stamps[3::apart]
+    ]
     messages.sort(key=lambda message: message[1])
     path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
     tolerance = TopicSettings(sync_tolerance_ms=1e-3)
     with open_log(path, LogConfig(topics=tolerance, frames=FrameSettings(every=2))) as log:
         selection = log.select()
-        expected = [each.number for each in log.frames(selection) if each.labelled]
+        expected = [frame.number for frame in log.frames(selection) if frame.labelled]
         read = chunks_read(log, monkeypatch)
-        found = [each.number for each in log.frames(selection, labelled=True)]
-    assert found == expected
+        numbers = [frame.number for frame in log.frames(selection, labelled=True)]
+    assert numbers == expected
     assert apart == 1 or len(read) < len(stamps)
 
 
@@ -164,8 +173,8 @@ def test_labels_are_paired_only_within_the_range(tmp_path, frames, monkeypatch):
     stamps = range(20_000_000, 20_024_000, 100)
     image, mask = jpeg(grey(9)), grey(0)
     mask[3:] = 255
-    messages = [("/camera", each, compressed(each, image)) for each in stamps]
-    messages += [("/labels", each + 50, raw(each, mask, "mono8")) for each in stamps[::4]]
+    messages = [("/camera", stamp, compressed(stamp, image)) for stamp in stamps]
+    messages += [("/labels", stamp + 50, raw(stamp, mask, "mono8")) for stamp in stamps[::4]]
     messages.sort(key=lambda message: message[1])
     path = ros2_log(tmp_path / "a.mcap", messages, chunk_size=1)
     topics = TopicSettings(sync_tolerance_ms=5e-5)
@@ -173,9 +182,9 @@ def test_labels_are_paired_only_within_the_range(tmp_path, frames, monkeypatch):
     with open_log(path, LogConfig(topics=topics, frames=frames)) as log:
         selection = log.select()
         read = chunks_read(log, monkeypatch)
-        found = [each.number for each in log.frames(selection, labelled=True)]
-        assert len(found) >= 3
-        assert all(number % 4 == 0 for number in found)
+        numbers = [frame.number for frame in log.frames(selection, labelled=True)]
+        assert len(numbers) >= 3
+        assert all(number % 4 == 0 for number in numbers)
         assert len(read) < len(messages) / 8
 
 
@@ -231,9 +240,9 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
     path = two_cameras(tmp_path / "a.mcap", names)
     _, frames = read(path)
     assert len(frames) == len(names)
-    (told,) = (note for note in frames[0].accounting.notes if "several cameras" in note)
-    assert f"{names[0]} ({names.count(names[0])})" in told
-    assert "`topics.frame_id` chooses one" in told
+    (note,) = (note for note in frames[0].accounting.notes if "several cameras" in note)
+    assert f"{names[0]} ({names.count(names[0])})" in note
+    assert "`topics.frame_id` chooses one" in note
     for name in {*names}:
         _, frames = read(path, topics=TopicSettings(frame_id=name, truth="/labels"))
         numbers = [number for number, other in enumerate(names) if other == name]
@@ -243,7 +252,7 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
 
 def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:
     path = two_cameras(tmp_path / "a.mcap", ["front", "rear"])
-    with pytest.raises(LogError, match="left: no image of the range has it; the first has front"):
+    with pytest.raises(LogError, match="no image of the range has left; the first has front"):
         read(path, topics=TopicSettings(frame_id="left", truth=""))
 
 
@@ -257,8 +266,10 @@ def test_a_label_under_several_stamps_is_told(tmp_path: Path, apart: int, repeat
         messages.append(("/camera", number + 1, compressed(number + 1, png(grey(number)))))
         messages.append(("/labels", number + 1, compressed(number + 1, png(mask))))
     _, frames = read(ros2_log(tmp_path / "a.mcap", messages))
-    told = [note for note in frames[-1].accounting.notes if "labels repeat" in note]
-    assert [note.split(" labels")[0] for note in told] == [f"{repeated} of the 12"] * (repeated > 0)
+    notes = [note for note in frames[-1].accounting.notes if "labels repeat" in note]
+    assert [note.split(" labels")[0] for note in notes] == [f"{repeated} of the 12"] * (
+        repeated > 0
+    )
 
 
 SECOND = 1_000_000_000
@@ -349,3 +360,94 @@ def test_the_cameras_own_name_is_read(log: Path) -> None:
 def test_what_is_no_image_is_called_by_its_name(log: Path) -> None:
     with pytest.raises((LogError, FrameError), match=REFUSED[log.stem]):
         frames(log)
+
+
+CHUNK = 100_000
+FRAMES = 40
+
+
+def write(
+    path: Path, *, size: int = CHUNK, frames: int = FRAMES, chunks=True, crcs=True, seed: int = 0
+) -> Path:
+    """Write a log of noise, a chunk each message, with data that a checksum alone can tell."""
+    noise = np.random.default_rng(seed)
+    options = {"chunk_size": size, "compression": CompressionType.NONE}
+    with path.open("wb") as file:
+        writer = Writer(file, **options, use_chunking=chunks, enable_crcs=crcs)
+        writer.start()
+        schema = writer.register_schema("Noise", "ros2msg", b"uint8[] data")
+        channel = writer.register_channel("/noise", "cdr", schema)
+        for number in range(frames):
+            writer.add_message(channel, number * 10**8, noise.bytes(size), number * 10**8)
+        writer.finish()
+    return path
+
+
+def digest(path: Path) -> str:
+    with open_log(path) as opened:
+        return opened.digest
+
+
+@pytest.fixture
+def noise(tmp_path):
+    return write(tmp_path / "noise.mcap")
+
+
+@pytest.mark.parametrize("kind", [{}, {"crcs": False}, {"chunks": False}])
+def test_a_log_has_one_digest_wherever_it_lies_and_another_log_another(tmp_path, kind):
+    first = write(tmp_path / "a.mcap", **kind)
+    (tmp_path / "there").mkdir()
+    assert digest(shutil.copy(first, tmp_path / "there" / "b.mcap")) == digest(first)
+    if kind.get("chunks", True):
+        assert digest(write(tmp_path / "c.mcap", seed=1, **kind)) != digest(first)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(first.read_bytes()[: -2 * CHUNK])
+    assert digest(cut) != digest(first)
+
+
+def test_the_digest_of_a_folder_is_that_of_its_files_in_order(tmp_path):
+    digests = []
+    for seeds in ((0, 1), (1, 0)):
+        folder = tmp_path / str(seeds)
+        folder.mkdir()
+        for place, seed in enumerate(seeds):
+            write(folder / f"log_{place}.mcap", seed=seed)
+        digests.append(digest(folder))
+    assert digests[0] != digests[1]
+
+
+def test_a_byte_that_changed_inside_a_chunk_is_found_by_verifying(noise, tmp_path):
+    content = bytearray(noise.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    other = tmp_path / "other.mcap"
+    other.write_bytes(content)
+    assert digest(other) == digest(noise)
+    intact, damaged = describe(noise, verify=True), describe(other, verify=True)
+    assert intact.sha256 == hashlib.sha256(noise.read_bytes()).hexdigest()
+    assert damaged.sha256 == hashlib.sha256(other.read_bytes()).hexdigest()
+    assert not intact.losses
+    assert damaged.losses
+
+
+def test_of_a_large_log_the_messages_are_not_read_unless_asked(noise, monkeypatch):
+    read = []
+
+    class Counted(FileBytes):
+        def __getitem__(self, part):
+            data = super().__getitem__(part)
+            read.append(len(data))
+            return data
+
+    for module in (records, file):
+        monkeypatch.setattr(module, "FileBytes", Counted)
+    monkeypatch.setattr(log, "SMALL", CHUNK)
+    description = describe(noise)
+    assert (description.verified, description.sha256) == (False, None)
+    assert [topic.count for topic in description.topics] == [FRAMES]
+    assert sum(read) < noise.stat().st_size / 4
+    steps = []
+    assert describe(noise, verify=True, on_bytes=lambda *step: steps.append(step)).verified
+    done, total = steps[-1]
+    assert total == 2 * noise.stat().st_size
+    assert 0.9 * total < done <= total
+    assert [one for one, _ in steps] == sorted(one for one, _ in steps)

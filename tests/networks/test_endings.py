@@ -142,7 +142,7 @@ def test_logits_are_interpolated_and_not_probabilities(tmp_path):
 
 
 def test_logits_that_are_called_probabilities_are_refused(tmp_path):
-    with pytest.raises(NetworkError, match=r"no probabilities, see `net\.activation`"):
+    with pytest.raises(NetworkError, match=r"no probabilities; see `net\.activation`"):
         road_of(tmp_path / "n.onnx", ONE, activation="none")
 
 

@@ -1,4 +1,4 @@
-"""A network's mask: the one that NumPy computes, in the frame's size."""
+"""A network's mask, the one that NumPy computes; what is read of its file, and asked for."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -231,7 +231,7 @@ ASKED = {
     "which of three classes": (
         {"classes": 3},
         {},
-        "the classes of its 3 that are road by `net.road`",
+        "tells 3 classes apart; give the numbers of those that are road by `net.road`",
     ),
     "which labels": ({"last": "ArgMax"}, {}, "`net.road`"),
     "a class that is not there": ({}, {"road": (2,)}, "has no class 2, but 2 from 0"),

@@ -1,4 +1,4 @@
-"""The package declares what it imports."""
+"""The package declares what it imports, and nothing at import needs POSIX."""
 
 import ast
 import re

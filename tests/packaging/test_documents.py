@@ -1,4 +1,4 @@
-"""What the documents name is there: paths, anchors of the version, and the licence."""
+"""What documents name is there, what pages and tables say is what code and measurements say."""
 
 import re
 import runpy
@@ -15,7 +15,7 @@ from benchmarks.tables import overlap
 from benchmarks.tables.drives import DRIVES
 from benchmarks.tables.measure import REPLAYS, SEEDS
 from benchmarks.tables.text import DOCUMENTS as MEASURED
-from benchmarks.tables.text import between_marks, faults, load, loose
+from benchmarks.tables.text import between_marks, faults, load, loose_numbers
 from roadeval import RunConfig
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import OPTIONS
@@ -236,7 +236,7 @@ def test_the_numbers_follow_the_measurement(arguments, capsys, tmp_path, monkeyp
     "number", ["5.3 %", "+10.7 pp", "12 ms", "4 points", "565 MiB", "1.35", "-0.6"]
 )
 def test_a_measured_number_in_a_sentence_is_found(number):
-    assert loose(f"ERR is {number} there.")
+    assert loose_numbers(f"ERR is {number} there.")
     (fault,) = faults(f"ERR is {number} there.", load())
     assert "a measured number outside a table" in fault
 

@@ -1,4 +1,4 @@
-"""The scripts in examples/ run as they stand."""
+"""The scripts in examples/, the examples of docstrings and the form of findings/."""
 
 import doctest
 import os

@@ -1,4 +1,4 @@
-"""Stages in a row: what each sees, and that a chain is a pure function of the image."""
+"""Stages in a row: what each sees, and what is made of an image where one is the truth."""
 
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
@@ -119,14 +119,14 @@ def test_without_its_filters_a_pipeline_keeps_the_other_settings():
 
 def test_what_is_learnt_depends_on_filters_and_on_stages_that_learn():
     pipeline = default(*NAMES)
-    assert pipeline.learning() == ("similarity", "svm")
-    assert list(pipeline.relevant()) == ["shadow", "similarity", "svm"]
+    assert pipeline.learning_stages() == ("similarity", "svm")
+    assert list(pipeline.relevant_settings()) == ["shadow", "similarity", "svm"]
 
 
 def test_what_is_learnt_does_not_depend_on_settings_of_inference_only(monkeypatch):
     another = dataclasses.replace(STAGES["svm"], name="another", inference_only=("gamma", "c"))
     monkeypatch.setitem(STAGES, "another", another)
-    relevant = default("another", "post").relevant()
+    relevant = default("another", "post").relevant_settings()
     assert relevant.keys() == {"another"}
     assert relevant["another"].keys() == {"kernel", "threshold"}
 

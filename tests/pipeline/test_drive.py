@@ -1,4 +1,4 @@
-"""Frames of whole drives, every layer against the plain pipeline."""
+"""Frames of whole drives, every layer against the plain pipeline; and what noise may cost."""
 
 from pathlib import Path
 from time import thread_time

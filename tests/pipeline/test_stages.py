@@ -1,4 +1,4 @@
-"""Stages from outside the package: imported by their names, and guarded."""
+"""Stages from outside the package: imported by their names, and guarded in what they hand out."""
 
 import numpy as np
 import pytest

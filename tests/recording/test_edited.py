@@ -1,4 +1,4 @@
-"""Recordings that Rerun's own commands have merged, cut or filtered: read, or refused by name."""
+"""Recordings that Rerun's own commands have merged, cut or made: read, or refused by name."""
 
 import subprocess
 from collections.abc import Callable

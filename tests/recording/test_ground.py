@@ -1,4 +1,4 @@
-"""The ground in the viewer: where its pictures lie in space, and in a rig below which paths."""
+"""The ground in the viewer, below which paths it lies, and what the viewer needs of the machine."""
 
 import subprocess
 from dataclasses import replace

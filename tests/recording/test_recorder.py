@@ -1,4 +1,4 @@
-"""The recording as a file: complete under its name, partial where a run ended early."""
+"""The recording as a file: complete or partial, in few chunks, with images that a rule keeps."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Which charts are made of which rows: each number where it belongs, in its own look."""
+"""Which charts are made of which rows, where their parts lie, and how layers are painted."""
 
 import math
 

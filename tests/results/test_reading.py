@@ -1,4 +1,4 @@
-"""Tables read back: what each column is, whatever stands in it."""
+"""Tables read back, what each column is; and rows that are made of sums."""
 
 import hashlib
 import math
@@ -10,7 +10,7 @@ from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import joined, windows
+from roadeval.evaluation.tables import concatenate, windows
 from roadeval.results.rows import Key, csv_lines, scores, sum_rows
 from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES, documentation
 from roadeval.results.tables import ResultsError, TableFacts, read_table
@@ -143,7 +143,7 @@ def of_region(frame, n, region="lit", **key):
 
 def test_each_mask_has_a_row_of_its_own_on_all_pixels_and_one_of_each_region():
     masks = {("net", "svm"): [20, 40], ("net", "post"): [10, 30]}
-    frames = joined([a_table(masks), a_table({("net", "svm"): [50]}, drive="road")])
+    frames = concatenate([a_table(masks), a_table({("net", "svm"): [50]}, drive="road")])
     regions = table_of("regions", [of_region(0, 2), of_region(1, -1), of_region(0, 1, "far")])
     known = {"variant": "net", "boundary_f": 0.7, "drive": "street", "camera": KEY.camera}
     rows = scores(frames, regions, [known])

@@ -1,4 +1,4 @@
-"""What a difference tells: how sure it is, in words."""
+"""What a difference and a comparison tell: how sure it is, in words."""
 
 from dataclasses import replace
 
@@ -44,9 +44,8 @@ def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
     assert told.endswith("net and wide of new: every frame as in base.")
     # ERR alone may stay where other rates change.
     moved = replace(rows[1], difference={**rows[1].difference, "FPR": WORSE})
-    assert "net of new is exactly as good as base" in comparison.verdict(
-        a_comparison(rows[0], moved)
-    )
+    text = comparison.verdict(a_comparison(rows[0], moved))
+    assert "net of new is exactly as good as base" in text
 
 
 def test_changed_settings_are_told_of_each_result_and_some_of_many():

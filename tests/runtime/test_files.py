@@ -1,4 +1,4 @@
-"""Files that appear under their name only when they are complete."""
+"""Files and folders that appear when they are complete, and claims on where they go."""
 
 import errno
 import fcntl
@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from roadeval.runtime import files
-from roadeval.runtime.files import Content, NewFolder, claimed
+from roadeval.runtime.files import Content, NewFolder, claim
 
 
 def names(folder):
@@ -107,10 +107,10 @@ def test_a_partial_name_is_found_again_and_no_two_are_the_same(tmp_path):
 
 
 def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
-    with files.claimed_file(tmp_path / "new" / "deep" / "file"):
+    with files.claim_file(tmp_path / "new" / "deep" / "file"):
         assert (tmp_path / "new" / "deep").is_dir()
     assert names(tmp_path) == []
-    with files.claimed_file(tmp_path / "new" / "deep" / "file"):
+    with files.claim_file(tmp_path / "new" / "deep" / "file"):
         (tmp_path / "new" / "other").touch()
     assert names(tmp_path / "new") == ["other"]
 
@@ -124,8 +124,8 @@ def test_a_pointer_of_git_lfs_is_no_input(tmp_path):
 
 HELD = """
 import pathlib, sys
-from roadeval.runtime.files import claimed
-with claimed(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]).parent):
+from roadeval.runtime.files import claim
+with claim(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]).parent):
     print("held", flush=True)
     sys.stdin.read()
 """
@@ -145,34 +145,34 @@ def other(tmp_path):
         process.kill()
 
 
-def claim(folder, name="out"):
-    with claimed(folder / name, folder) as certain:
+def claim_briefly(folder, name="out"):
+    with claim(folder / name, folder) as certain:
         return certain
 
 
 def test_what_another_process_writes_is_refused_with_its_name_until_it_is_killed(other, tmp_path):
     with pytest.raises(BlockingIOError) as caught:
-        claim(tmp_path)
+        claim_briefly(tmp_path)
     match = re.fullmatch(
         r"another run is writing it \(process (\d+) on \S+, since \d{4}-\d\d-\d\d \d\d:.*\)",
         caught.value.strerror,
     )
     assert int(match[1]) == other.pid
-    assert claim(tmp_path, "another")
+    assert claim_briefly(tmp_path, "another")
     other.send_signal(signal.SIGKILL)
     other.wait()
     assert listed(tmp_path) == [".out.lock"]
-    assert claim(tmp_path)
+    assert claim_briefly(tmp_path)
     assert listed(tmp_path) == []
 
 
 def test_two_in_one_process_are_two_and_the_first_one_s_lock_stays(tmp_path):
-    with claimed(tmp_path / "out", tmp_path):
+    with claim(tmp_path / "out", tmp_path):
         for _ in range(2):
             with pytest.raises(BlockingIOError, match=f"process {os.getpid()} on"):
-                claim(tmp_path)
+                claim_briefly(tmp_path)
         assert listed(tmp_path) == [".out.lock"]
-    assert claim(tmp_path)
+    assert claim_briefly(tmp_path)
 
 
 def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_path, monkeypatch):
@@ -185,11 +185,11 @@ def test_a_lock_that_was_removed_while_it_was_waited_for_counts_for_nothing(tmp_
         usual(lock, how)
 
     monkeypatch.setattr(fcntl, "flock", late)
-    with claimed(tmp_path / "out", tmp_path) as certain:
+    with claim(tmp_path / "out", tmp_path) as certain:
         assert certain
         assert listed(tmp_path) == [".out.lock"]
         with pytest.raises(BlockingIOError):
-            claim(tmp_path)
+            claim_briefly(tmp_path)
 
 
 def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkeypatch):
@@ -202,13 +202,13 @@ def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkey
         return usual(path, flags, *rest)
 
     monkeypatch.setattr(os, "open", forbidden)
-    with claimed(tmp_path / "out", tmp_path) as certain:
+    with claim(tmp_path / "out", tmp_path) as certain:
         assert certain
         with pytest.raises(BlockingIOError, match="process 1 on elsewhere"):
-            claim(tmp_path)
+            claim_briefly(tmp_path)
     assert listed(tmp_path) == []
     with pytest.raises(PermissionError):
-        claim(tmp_path)
+        claim_briefly(tmp_path)
 
 
 def no_locks_of_the_system(monkeypatch):
@@ -225,14 +225,14 @@ def no_locks_of_the_disk(monkeypatch):
 @pytest.mark.parametrize("without", [no_locks_of_the_system, no_locks_of_the_disk])
 def test_without_locks_nothing_is_certain(without, tmp_path, monkeypatch):
     without(monkeypatch)
-    with claimed(tmp_path / "out", tmp_path) as one, claimed(tmp_path / "out", tmp_path) as other:
+    with claim(tmp_path / "out", tmp_path) as one, claim(tmp_path / "out", tmp_path) as other:
         assert (one, other) == (False, False)
     assert listed(tmp_path) == []
 
 
 def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, monkeypatch):
     monkeypatch.setattr("time.sleep", lambda _seconds: (other.kill(), other.wait()))
-    with claimed(tmp_path / "out", tmp_path, wait=True) as certain:
+    with claim(tmp_path / "out", tmp_path, wait=True) as certain:
         assert certain
 
 

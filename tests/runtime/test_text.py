@@ -1,4 +1,4 @@
-"""Text from elsewhere: nothing in it can act, and what it says stays readable."""
+"""Text and documents from elsewhere: nothing acts, what would take minutes is refused."""
 
 import json
 import time

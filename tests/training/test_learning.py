@@ -1,4 +1,4 @@
-"""Which frames train, which are left out, and which are evaluated."""
+"""Which frames train, which are left out, which are evaluated; and the fitting of variants."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path

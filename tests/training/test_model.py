@@ -1,4 +1,4 @@
-"""The model file: plain data, complete or refused."""
+"""The model file: plain data, complete or refused, whatever array is damaged."""
 
 import dataclasses
 import json

@@ -1,1 +1,1 @@
-"""The commands, one file each: a module with a ``COMMAND`` is found by its folder."""
+"""The commands: each file here is one, whose function has the file's name."""

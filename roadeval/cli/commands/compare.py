@@ -5,31 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from roadeval.cli import arguments, console, messages
-
-
-def _ending(paths: list[Path] | None) -> list[Path] | None:
-    for path in paths or ():
-        if path.suffix.lower() not in (".pdf", ".html", ".md", ".json"):
-            raise typer.BadParameter(f"{path}: end it in .pdf, .html, .md or .json")
-    return paths
-
 
 Results = Annotated[
     list[Path],
     arguments.argument(
         "BASE NEW...",
-        "Recordings, results folders or fleets; of a single one its variants are compared.",
+        "Recordings, results folders or fleets; for a single one, its variants are compared.",
     ),
 ]
 Variants = Annotated[
     list[str] | None,
     arguments.option(
         "--variant",
-        "Only this one; of a single result the first is the base. Of several, a variant of the "
-        "base may be held against another: a=b. Repeatable.",
+        "Variant to compare, the others are left out; a=b compares the base's a with the new "
+        "result's b. For a single result the first one is the base. Repeatable.",
         "NAME|BASE'S=NEW'S",
     ),
 ]
@@ -37,14 +27,14 @@ Outputs = Annotated[
     list[Path] | None,
     arguments.option(
         "-o --output",
-        "Write it as .pdf, .html, .md or .json, by the ending. Repeatable.",
+        "File of the comparison, whose ending is .pdf, .html, .md or .json. Repeatable.",
         "FILE",
-        callback=_ending,
+        callback=arguments.ending_in(".pdf", ".html", ".md", ".json"),
     ),
 ]
 Junit = Annotated[
     Path | None,
-    arguments.option("--junit", "Write a case for each condition as JUnit's XML, for CI.", "FILE"),
+    arguments.option("--junit", "File of JUnit's XML with a case for each condition.", "FILE"),
 ]
 
 
@@ -60,11 +50,11 @@ def compare(
 ) -> int:
     """Compare results with the first, or the variants of one.
 
-    Drives are paired by name or log, and frames by stamp; frames that either trained on are left
-    out. One drive is judged over its frames, several over drives. Results of different drives are
-    not compared. Exit code 4 if a --fail-if condition holds; 1 if one
-    cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
-    of the smaller one; 3 if drives of a fleet failed, so that no number counts them.
+    Drives are paired by name or log, and frames by stamp. Frames that trained either result are
+    left out. One drive is judged over its frames, several drives are judged over the drives.
+    Results of different drives are not compared. Exit code 4 if a --fail-if condition holds; 1 if
+    one cannot be judged, as when two results share fewer than ten frames, or fewer than half the
+    frames of the smaller one; 3 if drives of a fleet failed, so that no number counts them.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
@@ -79,8 +69,7 @@ def compare(
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:
-        judged = [each for each in compared.judgements if each.holds is not None]
-        screen.show(compared.comparison, judged, console.results())
+        screen.show(compared.comparison, compared.judgements, console.results())
     for warning in compared.comparison.warnings:
         if warning not in compared.lost:
             messages.warning(warning)

@@ -1,23 +1,22 @@
-"""``roadeval config``: the whole effective configuration, to read and to edit."""
+"""``roadeval config``: the effective configuration, to read and to edit."""
 
 from __future__ import annotations
 
 from roadeval.cli import arguments, console
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
     *("preset", "config", "variants", "nets", "masks", "cameras"),
     *("output", "training", "truth", "topics", "labels", "frames", "run"),
 )
-def config(*, given: Given) -> int:
+def config(*, options: OptionValues) -> int:
     """Print the whole effective configuration as TOML.
 
-    Each setting with its meaning and range; the file that it makes can be edited and given to
-    --config.
+    Each setting comes with its meaning and range. The file can be edited and given to --config.
     """
-    settings = arguments.configuration(given)
+    settings = arguments.configuration(options)
     from roadeval.config.run import config_toml
 
     console.emit(config_toml(settings).rstrip())

@@ -13,13 +13,13 @@ DEFAULT: Final = Path("recordings", "demo.mcap")
 
 def demo(
     output: Annotated[
-        Path, arguments.option("-o --output", "Where the log lands.", "DRIVE.mcap")
+        Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")
     ] = DEFAULT,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Write the demo drive: a synthetic road with known truth.
 
-    100 frames, 640x480, 10 Hz; truth of the road and of shadow.
+    It has 100 frames of 640x480 pixels at 10 Hz, with truth of the road and of shadow.
     """
     from roadeval.jobs.log_files import demo as write
 

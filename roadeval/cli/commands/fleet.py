@@ -1,4 +1,4 @@
-"""``roadeval fleet``: many drives in one run, at the terminal."""
+"""``roadeval fleet``: many drives in one run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 Drives = Annotated[
     list[str],
@@ -30,31 +30,31 @@ def fleet(
         Path,
         arguments.option(
             "-o --output",
-            "Where all results land; what is done there already is not done again.",
+            "Folder of all results; drives whose results are there are not replayed again.",
             "FOLDER",
         ),
     ],
-    given: Given,
+    options: OptionValues,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Replay many drives and judge them together.
 
-    On this machine or a cluster. The folder is the state: the same command again does only what is
-    missing or has changed. A drive that cannot be used is a row with the reason, and the exit code
-    is 3 then.
+    The drives are replayed on this machine or on a cluster. The same command again replays only
+    what is missing or has changed. A drive that cannot be used is a row with the reason, and the
+    exit code is 3 then.
     """
-    config = arguments.configuration(given)
+    config = arguments.configuration(options)
     from roadeval.cli.screens import fleet as screen
     from roadeval.jobs.run.fleet import replay_fleet as run
 
-    with progress.watched(quiet) as watch:
-        found = run(paths, output, config, on_progress=watch)
+    with progress.show(quiet) as watch:
+        outcome = run(paths, output, config, on_progress=watch)
     if json:
-        console.emit(found.facts.text().rstrip())
+        console.emit(outcome.facts.text().rstrip())
     elif not quiet:
-        screen.show(found, console.results())
-    messages.loops_missing()
-    for sentence in screen.problems(found):
+        screen.show(outcome, console.results())
+    messages.warn_of_missing_loops()
+    for sentence in screen.problems(outcome):
         messages.warning(sentence)
-    return ExitCode.LOSS if found.lost else ExitCode.DONE
+    return ExitCode.LOSS if outcome.lost else ExitCode.DONE

@@ -1,11 +1,11 @@
-"""``roadeval info``: what is in a log, and what replay would pick of it and why."""
+"""``roadeval info``: the content of a log, and what replay would use of it and why."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
@@ -15,32 +15,32 @@ from roadeval.cli.options import Given, takes
 def info(
     drive: arguments.Drive,
     *,
-    given: Given,
+    options: OptionValues,
     verify: Annotated[
-        bool, arguments.option("--verify", "Read the whole log, so that all damage is found.")
+        bool, arguments.option("--verify", "Search of the whole log for damage.")
     ] = False,
     json: arguments.Json = False,
 ) -> int:
     """Show what is in a log and what replay would pick.
 
-    Topics with their kind, size, number and rate of messages, gaps and damage; and why replay
-    would pick what it picks, or what it would ask for. Of a log of more than 50 MB only the
-    indexes are read, unless --verify asks for all of it.
+    Shows the topics with their kind, size, number and rate of messages, gaps and damage; and why
+    replay would pick what it picks, or what it would ask for. If the log has more than 50 MB, only
+    its indexes are read, unless --verify is given.
     """
-    arguments.one_camera(given)
-    config = arguments.configuration(given)
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.log_files import info as describe
 
-    with progress.watched(quiet=json or not verify) as watch:
-        found = describe(drive, config, verify=verify, on_progress=watch)
+    with progress.show(quiet=json or not verify) as watch:
+        log = describe(drive, config, verify=verify, on_progress=watch)
     if json:
         from roadeval.results.facts import json_text
 
-        console.emit(json_text(found.as_dict()).rstrip())
+        console.emit(json_text(log.as_dict()).rstrip())
     else:
-        screen.show(found.as_dict(), console.results())
-    for damage in found.damage:
-        if damage not in found.losses:
+        screen.show(log, console.results())
+    for damage in log.damage:
+        if damage not in log.losses:
             messages.warning(damage)
-    return messages.losses(found.losses)
+    return messages.losses(log.losses)

@@ -1,4 +1,4 @@
-"""``roadeval inspect``: the worst frames, and the viewer opened at one."""
+"""``roadeval inspect``: a list of the worst frames, or the viewer opened at one."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ if TYPE_CHECKING:
 Results = Annotated[
     Path, arguments.argument("RESULT", "A recording (.rrd), a results folder, or a fleet's folder.")
 ]
-Listed = Annotated[bool, arguments.option("--list", "Print the worst frames with reasons.")]
-Frame = Annotated[int | None, arguments.option("--frame", "Open at frame N.", "N", min=0)]
+Listed = Annotated[bool, arguments.option("--list", "List of the worst frames, with reasons.")]
+Frame = Annotated[int | None, arguments.option("--frame", "Frame to open.", "N", min=0)]
 Rank = Annotated[
-    int | None, arguments.option("--worst", "Open at the K-th worst frame.", "K", min=1)
+    int | None,
+    arguments.option("--worst", "Rank of the frame to open; 1 is the worst.", "K", min=1),
 ]
 Variant = Annotated[
     str | None,
     arguments.option(
         "--variant",
-        "Variant whose failures count; by default what you brought, else `filtered`.",
+        "Variant by which frames rank. Default: what you brought, else filtered.",
         "NAME",
     ),
 ]
@@ -34,7 +35,7 @@ Screenshot = Annotated[
     Path | None,
     arguments.option(
         "--screenshot",
-        "No window: draw it into a file instead. Without a frame, the worst pictured.",
+        "File for a picture of the frame; no window opens. Default: the worst frame with pictures.",
         "FILE.png",
     ),
 ]
@@ -53,9 +54,9 @@ def inspect(
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
 
-    The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
-    is listed. Of a fleet the frames of all drives are ranked together, and the worst of all opens
-    by default.
+    The viewer works offline and listens on 127.0.0.1 alone. Among neighbouring frames only the
+    worst is listed. In a fleet the frames of all drives are ranked together, and the worst one
+    opens by default.
     """
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")
@@ -63,9 +64,9 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.of_camera(Result(recording), camera)
+    opened = arguments.select_camera(Result(recording), camera)
     if opened.fleet and variant is not None:
-        raise typer.BadParameter("--variant does not go with a fleet: its worst are the first's")
+        raise typer.BadParameter("--variant does not go with a fleet, which ranks only its first")
     if opened.fleet and frame is not None:
         raise typer.BadParameter("--frame does not go with a fleet: give its drive's recording")
     if listed:
@@ -83,31 +84,31 @@ def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bo
     from roadeval.jobs.results import inspect as job
     from roadeval.results.facts import json_text, plain
 
-    found = job.worst_frames(opened, count or job.LISTED, variant)
+    frames = job.worst_frames(opened, count or job.LISTED, variant)
     if as_json:
-        console.emit(json_text(plain([asdict(each) for each in found])).rstrip())
+        console.emit(json_text(plain([asdict(frame) for frame in frames])).rstrip())
     else:
-        screen.show(opened.name, found, console.results(), of_fleet=opened.fleet is not None)
+        screen.show(opened.name, frames, console.results(), of_fleet=opened.fleet is not None)
 
 
 def _show(
     opened: Result, frame: int | None, rank: int | None, variant: str | None, *, file: Path | None
 ) -> None:
-    """Open the viewer at a frame, by its number or rank, or draw it into a file."""
+    """Open the viewer at a frame, which its number or rank names, or write its picture."""
     from roadeval.evaluation.metrics import TESTED
     from roadeval.jobs.results import inspect as job
 
-    drive, of, why = opened.drive, "", ""
+    drive, place, why = opened.drive, "", ""
     if rank is not None or drive is None:
-        found = job.of_rank(opened, rank or 1, variant)
-        drive, of = job.drive_of(opened, found)
-        frame = found.frame if frame is None else frame
-    elif file and frame is None and (bad := job.worst(drive, variant)):
-        which = "worst" if bad.by == TESTED else "first to look at"
+        ranked = job.of_rank(opened, rank or 1, variant)
+        drive, place = job.drive_of(opened, ranked)
+        frame = ranked.frame if frame is None else frame
+    elif file and frame is None and (worst := job.worst(drive, variant)):
+        which = "worst" if worst.by == TESTED else "first to look at"
         why = f", the {which} with pictures (--frame N or --worst K takes another)"
-        frame = bad.frame
+        frame = worst.frame
     if frame is not None and (sentence := job.without_pictures(drive, frame)):
         messages.warning(sentence)
     shown = job.view(drive, frame, file)
     if file:
-        console.emit(f"{file}: {of}frame {shown}{why}")
+        console.emit(f"{file}: {place}frame {shown}{why}")

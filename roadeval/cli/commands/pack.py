@@ -11,16 +11,16 @@ from roadeval.cli.exit_codes import ExitCode
 
 def pack(
     images: Annotated[Path, arguments.argument("IMAGES", "A folder of images, or a video file.")],
-    output: Annotated[Path, arguments.option("-o --output", "Where the log lands.", "DRIVE.mcap")],
+    output: Annotated[Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")],
     *,
     truth: Annotated[
-        Path | None, arguments.option("--truth", "A folder of masks, paired by name.", "MASKS")
+        Path | None, arguments.option("--truth", "Folder of masks, paired by name.", "MASKS")
     ] = None,
     rate: Annotated[
         float | None,
         arguments.option(
             "--rate",
-            "Images a second. Default: the times in the names, a video's own, or 10.",
+            "Images per second. Default: the times in the names, the rate of the video, or 10.",
             "HZ",
         ),
     ] = None,
@@ -28,7 +28,8 @@ def pack(
 ) -> int:
     """Make a log of a folder of images or a video.
 
-    Foxglove and Rerun open it too: JPEGs as they are, masks as PNG, Foxglove's protobuf schemas.
+    Foxglove and Rerun open the log, too. JPEGs are copied, masks become PNGs, and the messages
+    have Foxglove's protobuf schemas.
     """
     from roadeval.jobs.log_files import pack as run
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 if TYPE_CHECKING:
-    from roadeval.jobs.results.pick import Outcome
+    from roadeval.jobs.results.pick import PickedFrames
 
 
 @takes("preset", "config", "nets", "training.model", "cameras", "run.jobs")
@@ -30,59 +30,63 @@ def pick(
         int, arguments.option("-n --count", "Frames to label.", "N", min=1, max=100_000)
     ],
     output: Annotated[
-        Path, arguments.option("-o --output", "Where they land, or go on.", "FOLDER")
+        Path, arguments.option("-o --output", "Folder; an existing one is extended.", "FOLDER")
     ],
     form: Annotated[
         Literal["png", "coco"],
-        arguments.option("--format", "Of the present masks, which are to be corrected."),
+        arguments.option("--format", "Format of the proposed masks."),
     ] = "png",
     variant: Annotated[
-        str | None, arguments.option("--by", "Whose masks and doubt. Default: the first.", "NAME")
+        str | None,
+        arguments.option(
+            "--by", "Variant whose masks and uncertainty are used. Default: the first.", "NAME"
+        ),
     ] = None,
-    seed: Annotated[int, arguments.option("--seed", "Of the drawing.", "N", min=0)] = 0,
-    given: Given,
+    seed: Annotated[int, arguments.option("--seed", "Random seed.", "N", min=0)] = 0,
+    options: OptionValues,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Pick frames of a log without truth to label.
 
-    Half of them are drawn at random along the drive: of these 'replay --truth FOLDER' makes a
-    number for the whole drive, with its interval. The others are those most in doubt, apart from
-    each other: to learn from. FOLDER/images has the images, FOLDER/proposals the present masks;
-    corrected ones belong into FOLDER/labels. Picking again into the same folder goes on. How a log
-    is replayed first is told by a --config of 'replay'; a result is taken as it is.
+    Half of them are drawn at random along the drive; from these 'replay --truth FOLDER' estimates
+    the rates of the whole drive, with an interval. The others are the most uncertain ones, apart
+    from each other, to learn from. FOLDER/images has the images, FOLDER/proposals the present
+    masks; put the corrected masks into FOLDER/labels. Picking again into the same folder adds
+    frames. A log is replayed first, by the --config of 'replay'; a result is used as it is.
     """
-    arguments.one_camera(given)
-    config = arguments.configuration(given)
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
     from roadeval.data.words import counted
     from roadeval.jobs.results.pick import pick as run
     from roadeval.logs.truth.picks import Why
 
-    with progress.watched(quiet) as watch:
-        found = run(
+    with progress.show(quiet) as watch:
+        drives = run(
             *(sources, count, output, config),
             labels=form,
             variant=variant,
             seed=seed,
             on_progress=watch,
         )
-    for each in found if not quiet else ():
-        random = sum(frame.why is Why.RANDOM for frame in each.added)
-        ranked, by = len(each.added) - random, each.picks.method["ranked_by"]
-        doubt = f", {ranked} most in doubt (by {by})" if ranked else ""
-        of = f"{random} drawn at random of {len(each.picks.stamps):,}"
-        console.emit(f"{each.folder}: {counted(len(each.added), 'frame')} to label: {of}{doubt}")
-    if found and not quiet:
+    for drive in drives if not quiet else ():
+        random = sum(frame.why is Why.RANDOM for frame in drive.added)
+        ranked, by = len(drive.added) - random, drive.picks.method["ranked_by"]
+        uncertain = f", {ranked} most in doubt (by {by})" if ranked else ""
+        drawn = f"{random} drawn at random of {len(drive.picks.stamps):,}"
+        added = counted(len(drive.added), "frame")
+        console.emit(f"{drive.folder}: {added} to label: {drawn}{uncertain}")
+    if drives and not quiet:
         out = console.results()
-        out.print(f"Correct {found[0].folder}/proposals, and put the results into labels/.")
-        console.show_next(out, _next(found, output))
-    messages.loops_missing()
+        out.print(f"Correct {drives[0].folder}/proposals, and put the results into labels/.")
+        console.show_next(out, _next_command(drives, output))
+    messages.warn_of_missing_loops()
     return ExitCode.DONE
 
 
-def _next(found: Sequence[Outcome], output: Path) -> str:
-    """Return the command that scores the logs with their labels, in the way they were replayed."""
-    logs, config = join(each.log for each in found), quote(str(found[0].config))
-    if len(found) == 1:
-        return f"roadeval replay {logs} --config {config} --truth {quote(str(found[0].folder))}"
+def _next_command(drives: Sequence[PickedFrames], output: Path) -> str:
+    """Return the command that scores the logs with their labels, as they were replayed."""
+    logs, config = join(drive.log for drive in drives), quote(str(drives[0].config))
+    if len(drives) == 1:
+        return f"roadeval replay {logs} --config {config} --truth {quote(str(drives[0].folder))}"
     truth = quote(f"{output}/{{drive}}")
     return f"roadeval fleet {logs} --config {config} --truth {truth} -o labelled"

@@ -1,9 +1,9 @@
-"""``roadeval replay``: the main job at the terminal."""
+"""``roadeval replay``: one log in, a recording, tables and figures out."""
 
 from __future__ import annotations
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
@@ -13,28 +13,28 @@ from roadeval.cli.options import Given, takes
 def replay(
     drive: arguments.Drive,
     *,
-    given: Given,
+    options: OptionValues,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Replay a log; record, score and plot every step.
 
-    Every intermediate goes into a recording for the Rerun viewer. Where the log has truth, each
-    stage is scored against it, with the shadow filter and without.
+    Every intermediate goes into a recording for the Rerun viewer. If the log has truth, each stage
+    is scored against it, with the shadow filter and without.
     """
-    config = arguments.configuration(given)
+    config = arguments.configuration(options)
     from roadeval.cli.screens import replay as screen
     from roadeval.jobs.run.replay import replay as run
 
-    with progress.watched(quiet) as watch:
-        found = run(drive, config, on_progress=watch)
+    with progress.show(quiet) as watch:
+        outcome = run(drive, config, on_progress=watch)
     if json:
-        console.emit(found.facts.text().rstrip())
+        console.emit(outcome.facts.text().rstrip())
     elif not quiet:
-        screen.show(found, console.results())
-    for text in found.tracebacks:
+        screen.show(outcome, console.results())
+    for text in outcome.tracebacks:
         messages.traceback(text)
-    messages.loops_missing()
-    for warning in found.warnings:
+    messages.warn_of_missing_loops()
+    for warning in outcome.warnings:
         messages.warning(warning)
-    return messages.losses(found.losses)
+    return messages.losses(outcome.losses)

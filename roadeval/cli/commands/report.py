@@ -5,16 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-
-
-def _ending(path: Path | None) -> Path | None:
-    if path is not None and path.suffix.lower() not in (".pdf", ".html", ".htm", ""):
-        raise typer.BadParameter(f"{path}: end it in .pdf or .html")
-    return path
 
 
 def report(
@@ -24,10 +16,10 @@ def report(
         Path | None,
         arguments.option(
             "-o --output",
-            "A page to browse where it ends in .html. Default: reports/<recording>.pdf, or "
-            "report.pdf in the folder given.",
+            "File of the report; one that ends in .html is a page to browse. Default: "
+            "reports/<recording>.pdf, or report.pdf in the results folder.",
             "FILE.pdf|FILE.html",
-            callback=_ending,
+            callback=arguments.ending_in(".pdf", ".html", unnamed=(".htm", "")),
         ),
     ] = None,
     camera: arguments.Camera = None,
@@ -35,15 +27,15 @@ def report(
 ) -> int:
     """Write the report of a drive or of a fleet, as a PDF or as a page.
 
-    Does the filter help, where are the errors, which stage broke it, and the frames to look at;
-    from the recording alone, or from a results folder, then without pictures. A page is one file
-    that needs no network and no server.
+    It shows whether the filter helps, where the errors are, which stage causes them, and which
+    frames to look at. A recording is enough; the report of a results folder has no pictures. A
+    page is one file that needs no network and no server.
     """
     from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.of_camera(Result(result), camera)
-    with progress.watched(quiet) as watch:
+    opened = arguments.select_camera(Result(result), camera)
+    with progress.show(quiet) as watch:
         path = write_report(opened, output, on_progress=watch)
     if not quiet:
         console.emit(str(path))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.options import Given, takes
+from roadeval.cli.options import OptionValues, takes
 
 
 @takes(
@@ -26,23 +26,23 @@ def train(
         ),
     ],
     *,
-    output: Annotated[Path, arguments.option("-o --output", "Where the model lands.", "MODEL")],
-    given: Given,
+    output: Annotated[Path, arguments.option("-o --output", "File of the model.", "MODEL")],
+    options: OptionValues,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Train a model on some drives, for use on others.
 
-    The training frames are labelled ones, spread evenly over each drive. Where no drive has road
+    The training frames are labelled ones, spread evenly over each drive. If no drive has road
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
     Replay never evaluates the training frames, on any drive.
     """
-    arguments.one_camera(given)
-    config = arguments.configuration(given)
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
     from roadeval.jobs.run.train import train as run
 
-    with progress.watched(quiet) as watch:
+    with progress.show(quiet) as watch:
         model = run(paths, output, config, on_progress=watch)
-    messages.loops_missing()
+    messages.warn_of_missing_loops()
     for warning in model.warnings:
         messages.warning(warning)
     if not quiet:

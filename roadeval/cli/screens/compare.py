@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 def show(comparison: Comparison, judgements: Sequence[Judgement], out: Console) -> None:
-    """Print what changed and the conditions that were kept; those that hold are errors."""
-    kept = [judgement for judgement in judgements if not judgement.holds]
-    tables.show([*overview(comparison, kept, NAMED), *changed_drives(comparison)], out)
+    """Print what changed, and the conditions that do not hold; the others are errors."""
+    judged = [judgement for judgement in judgements if judgement.holds is not None]
+    passed = [judgement for judgement in judged if not judgement.holds]
+    tables.show([*overview(comparison, passed, NAMED), *changed_drives(comparison)], out)

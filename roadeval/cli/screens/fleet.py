@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from roadeval.jobs.run.fleet import FleetOutcome
 
 WORST: Final = 12
-"""Drives that the table of drives shows."""
+"""Drives in the table of drives."""
 NAMED: Final = 5
-"""Drives that failed for one reason, which are named."""
+"""Drives that are named for each reason of failure."""
 
 
 def show(outcome: FleetOutcome, out: Console) -> None:
     """Print how many drives there are, the verdict, the rates, and the effects over drives."""
     facts = outcome.facts
-    total = sum(outcome.counts.values())
+    earlier = sum(outcome.counts.values()) - outcome.replayed
     out.print(drives_account(outcome.counts, facts.frames))
-    if 0 < outcome.replayed < total:
-        out.print(f"{total - outcome.replayed} of them were done before.")
-    elif not outcome.replayed:
+    if not outcome.replayed:
         out.print("All of it was done before.")
+    elif earlier > 0:
+        out.print(f"{earlier} of them were done before.")
     out.print()
     out.print(with_flags(facts.verdict))
     out.print()
@@ -45,12 +45,12 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         tables.show([*blocks, Heading("Drives with the highest ERR"), worst], out)
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
-    listed = [f"roadeval inspect {outcome.folder} --list"] if facts.totals else []
-    console.show_next(out, *listed, f"roadeval report {outcome.folder}")
+    inspect = [f"roadeval inspect {outcome.folder} --list"] if facts.totals else []
+    console.show_next(out, *inspect, f"roadeval report {outcome.folder}")
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
-    """Yield what to know first, and why drives failed, with the first drives of each reason."""
+    """Yield the warnings, and why drives failed, with the first drives of each reason."""
     yield from outcome.facts.warnings
     fleet = FleetFolder(outcome.folder)
     failed = fleet.drives.loc[[*outcome.problems]]

@@ -1,9 +1,9 @@
-"""The description of a log as a screen of text."""
+"""The description of a log on one screen."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
@@ -14,55 +14,50 @@ from roadeval.report.blocks import Table
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from roadeval.logs.log import LogDescription
+    from roadeval.logs.topics.reader import TopicInfo
+
 NS = 1_000_000_000
 
 
-def show(found: Mapping[str, Any], out: Console) -> None:
-    """Print what `roadeval.logs.log.describe` found, as plain data."""
-    start, end = found["start_ns"], found["end_ns"]
-    size = f"{found['bytes'] / 1e6:.1f} MB"
-    known = "" if found["verified"] else "; not read whole, --verify looks for all damage"
-    length = f"{(end - start) / NS:.1f} s from {timestamp(start)}"
-    out.print(f"{found['path']}: {length}, {size}{known}", soft_wrap=True)
+def show(log: LogDescription, out: Console) -> None:
+    """Print what a log holds, and what replay would pick of it."""
+    size = f"{log.bytes / 1e6:.1f} MB"
+    unverified = "" if log.verified else "; not read whole, --verify looks for all damage"
+    length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
+    out.print(f"{log.path}: {length}, {size}{unverified}", soft_wrap=True)
     out.print()
-    tables.show_table(_topics(found["topics"]), out)
-    for topic in found["topics"]:
-        if topic["problem"]:
-            out.print(f"{topic['name']} cannot be read: {topic['problem']}", soft_wrap=True)
-        for before, after in topic["gaps"]:
-            gap = f"gap of {(after - before) / NS:.2f} s, {(before - start) / NS:.2f} s after"
-            out.print(f"{topic['name']}: {gap} the start", soft_wrap=True)
+    tables.show_table(_topic_table(log.topics), out)
+    for topic in log.topics:
+        if topic.problem:
+            out.print(f"{topic.name} cannot be read: {with_flags(topic.problem)}", soft_wrap=True)
+        for before, after in topic.gaps:
+            gap = f"gap of {(after - before) / NS:.2f} s"
+            since = f"{(before - log.start_ns) / NS:.2f} s after the start"
+            out.print(f"{topic.name}: {gap}, {since}", soft_wrap=True)
     out.print()
-    if found["problem"]:
-        out.print(f"replay would stop: {with_flags(found['problem'])}", soft_wrap=True)
-    else:
-        for misfit in found["misfits"]:
-            out.print(console.wrapped(with_flags(misfit), out.width, 0), soft_wrap=True)
-        out.print("replay would pick")
-        for pick in found["picks"]:
-            out.print(
-                console.wrapped(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True
-            )
+    if log.problem:
+        out.print(f"replay would stop: {with_flags(log.problem)}", soft_wrap=True)
+        return
+    for misfit in log.misfits:
+        out.print(console.wrap(with_flags(misfit), out.width, 0), soft_wrap=True)
+    out.print("replay would pick")
+    for pick in log.picks:
+        out.print(console.wrap(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True)
 
 
-def _topics(topics: Sequence[Mapping[str, Any]]) -> Table:
-    return Table(
-        ["topic", "carries", "size", "messages", "rate"],
-        [
+def _topic_table(topics: Sequence[TopicInfo]) -> Table:
+    rows = []
+    for topic in topics:
+        rate = f"{topic.rate_hz:.4g} Hz" if topic.rate_hz else ""
+        rows.append(
             [
-                topic["name"],
-                f"{topic['format'] or topic['schema'] or 'no schema'} ({topic['encoding']})",
-                "x".join(str(side) for side in topic["size"] or ()),
-                str(topic["count"]),
-                _rate(topic["rate_hz"]),
+                topic.name,
+                f"{topic.format or topic.schema or 'no schema'} ({topic.encoding})",
+                "x".join(map(str, topic.size or ())),
+                str(topic.count),
+                rate if not topic.rate_hz or topic.rate_hz >= 0.01 else "< 0.01 Hz",
             ]
-            for topic in topics
-        ],
-        text_columns=(0, 1),
-    )
-
-
-def _rate(rate: float | None) -> str:
-    if not rate:
-        return ""
-    return f"{rate:.4g} Hz" if rate >= 0.01 else "< 0.01 Hz"
+        )
+    columns = ["topic", "carries", "size", "messages", "rate"]
+    return Table(columns, rows, text_columns=(0, 1))

@@ -17,49 +17,50 @@ if TYPE_CHECKING:
     from roadeval.jobs.results.inspect import WorstFrame
 
 
-def show(name: str, found: Sequence[WorstFrame], out: Console, *, of_fleet: bool) -> None:
+def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: bool) -> None:
     """Print the worst frames with their rates.
 
-    Of a drive with the parts of ERR and the notes; of a fleet with whether the drive's recording
-    was kept.
+    The frames of a drive come with the parts of ERR and notes, the frames of a fleet with whether
+    the recording of their drive was kept.
     """
-    mask = f"{found[0].variant} by {found[0].by} of {found[0].stage}"
-    scored = found[0].by == TESTED
-    what, rule = "worst frames", "of neighbours only the worst"
-    if not scored:
-        what, rule = "without truth, frames to look at", "one a scene; a rank, and no error rate"
+    first, is_scored = frames[0], frames[0].by == TESTED
+    what, rule = "worst frames", "the worst of neighbours"
+    if not is_scored:
+        what = "without truth, frames to look at"
+        rule = "one per scene; ranked by uncertainty, not by error"
     elif of_fleet:
-        rule = "of a drive at most three, a second apart"
-    out.print(f"{name}: {what} of {mask} ({rule})")
+        rule = "at most three per drive, a second apart"
+    out.print(f"{name}: {what} of {first.variant} by {first.by} of {first.stage} ({rule})")
     out.print()
-    rates, rig = [*found[0].rates], any(each.camera for each in found)
-    names = short_names([*dict.fromkeys(each.camera for each in found)])
-    whose = ["drive"] if of_fleet else ["camera"] if rig else []
-    more = ["kept"] if of_fleet else ["why"] if scored else []
-    rows = [
-        [
-            str(each.rank),
-            *([each.drive if of_fleet else names[each.camera]] if whose else []),
-            str(each.frame),
-            *(percent(each.rates[rate]) for rate in rates),
-            *(["yes" if each.recording else "-"] if of_fleet else [_why(each)] if scored else []),
-        ]
-        for each in found
-    ]
-    titles = ["", *whose, "frame", *(f"{rate} %" for rate in rates), *more]
-    words = [p for p, title in enumerate(titles) if title in ("drive", "camera", "why")]
-    words = [0, *words] if of_fleet else words
-    breaks = range(1, len(rows)) if more == ["why"] else ()
-    show_table(Table(titles, rows, text_columns=words, breaks=breaks), out)
-    if of_fleet and not all(each.recording for each in found):
+    columns = {"": [str(frame.rank) for frame in frames]}
+    if of_fleet:
+        columns["drive"] = [frame.drive for frame in frames]
+    elif any(frame.camera for frame in frames):
+        names = short_names([*dict.fromkeys(frame.camera for frame in frames)])
+        columns["camera"] = [names[frame.camera] for frame in frames]
+    columns["frame"] = [str(frame.frame) for frame in frames]
+    for rate in first.rates:
+        columns[f"{rate} %"] = [percent(frame.rates[rate]) for frame in frames]
+    if of_fleet:
+        columns["kept"] = ["yes" if frame.recording else "-" for frame in frames]
+    elif is_scored:
+        columns["why"] = [_why(frame) for frame in frames]
+    titles = [*columns]
+    texts = {"drive", "camera", "why"} | ({""} if of_fleet else set())
+    places = [place for place, title in enumerate(titles) if title in texts]
+    breaks = range(1, len(frames)) if "why" in columns else ()
+    rows = [[*row] for row in zip(*columns.values(), strict=True)]
+    show_table(Table(titles, rows, text_columns=places, breaks=breaks), out)
+    if of_fleet and not all(frame.recording for frame in frames):
         out.print()
-        out.print("Where no recording was kept, --worst K says how to make it.")
+        out.print("If a recording was not kept, --worst K says how to make it.")
 
 
 def _why(frame: WorstFrame) -> str:
     (first, value), *rest = frame.parts.items()
     terms = [f"{first} {percent(value, 1)}", *(f"{name} {points(part, 1)}" for name, part in rest)]
-    notes = without_filter(frame.notes) if rest else frame.notes
-    # The title names the variant.
-    notes = [note.removeprefix(f"{frame.variant} ") for note in notes]
-    return " ".join([f"{ascii_of(', '.join(terms))} pp.", *(n[:1].upper() + n[1:] for n in notes)])
+    sentences = [f"{ascii_of(', '.join(terms))} pp."]
+    for note in without_filter(frame.notes) if rest else frame.notes:
+        shown = note.removeprefix(f"{frame.variant} ")  # the title names the variant
+        sentences.append(shown[:1].upper() + shown[1:])
+    return " ".join(sentences)

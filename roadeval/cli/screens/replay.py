@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 def show(outcome: Outcome, out: Console) -> None:
     """Print what a replay read, how well each variant did, and where everything was written."""
     facts = outcome.facts
-    of = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
-    out.print(f"{facts.drive.name}: {of}{account(facts.frames, facts.windows)}")
+    cameras = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
+    out.print(f"{facts.drive.name}: {cameras}{account(facts.frames, facts.windows)}")
     out.print()
     if facts.totals:
-        tables.show([Text(with_flags(facts.verdict)), *_scores(facts, outcome.metres)], out)
+        tables.show([Text(with_flags(facts.verdict)), *_score_tables(facts, outcome.metres)], out)
     else:
         for sentence in facts.misfits:
             out.print(with_flags(sentence))
@@ -47,14 +47,14 @@ def show(outcome: Outcome, out: Console) -> None:
     _show_files(outcome, out)
 
 
-def _scores(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
-    """Yield the tables of a replay that scored anything."""
+def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
+    """Yield the tables of a replay that scored frames."""
     yield stages_table(facts.totals)
     if facts.cameras:
         yield cameras_table(facts)
     if pairs := facts.final_effects:
         yield differences_table(facts, brief=True)
-        if legend := correction(each.rates[TESTED] for each in pairs):
+        if legend := correction(pair.rates[TESTED] for pair in pairs):
             yield Text(legend)
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
@@ -63,18 +63,19 @@ def _scores(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:
-    """Print where the outputs lie, and what to type next; no path is broken: it can be copied."""
+    """Print the paths of the outputs on one line each, to copy, and what to type next."""
     if outcome.recording:
-        out.print(f"recording  {outcome.recording} ({size(outcome.recording)})", soft_wrap=True)
+        size = megabytes(outcome.recording)
+        out.print(f"recording  {outcome.recording} ({size})", soft_wrap=True)
     if outcome.reports:
         count = len(outcome.files)
         out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
     if place := outcome.recording or outcome.reports:
-        console.show_next(out, *_next(outcome, place))
+        console.show_next(out, *_next_commands(outcome, place))
 
 
-def _next(outcome: Outcome, place: Path) -> Iterator[str]:
-    """Yield what to type next."""
+def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:
+    """Yield the commands to type next."""
     scored, log = bool(outcome.facts.totals), outcome.facts.log
     if outcome.recording and has_screen():
         yield f"rerun {place}"
@@ -87,7 +88,7 @@ def _next(outcome: Outcome, place: Path) -> Iterator[str]:
     yield f"roadeval report {place}"
 
 
-def size(file: Path) -> str:
-    """Write a file's size for a person."""
-    bytes_ = file.stat().st_size
-    return f"{bytes_ / 1e6:.1f} MB" if bytes_ >= 1e6 else f"{max(bytes_ / 1e3, 0.1):.1f} kB"
+def megabytes(file: Path) -> str:
+    """Return a file's size in MB, or in kB if it is small."""
+    size = file.stat().st_size
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{max(size / 1e3, 0.1):.1f} kB"

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 GAP: Final = 2
 """Spaces between columns."""
 LONGEST: Final = 20
-"""Longer names may be folded, so that numbers are beside them."""
+"""Letters of a name above which it may be folded, so that numbers are beside it."""
 
 
 def show(blocks: Iterable[Block], out: Console) -> None:
     """Print headings, texts, lists and tables, with an empty line between them."""
-    for place, block in enumerate(blocks):
-        if place:
+    for number, block in enumerate(blocks):
+        if number:
             out.print()
         match block:
             case Heading() | Text():
@@ -38,14 +38,17 @@ def show(blocks: Iterable[Block], out: Console) -> None:
 def show_table(table: Table, out: Console) -> None:
     """Print a table.
 
-    Columns of numbers that the console has no room for are printed below, with the words again.
+    Columns of numbers for which the console has no room are printed below, with the names again.
     """
     from rich import box
     from rich.table import Table as Grid
 
     if table.caption:
         out.print(ascii_of(table.caption))
-    columns = [_texts(table, place) for place in range(len(table.columns))]
+    columns = []
+    for place in range(len(table.columns)):
+        texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
+        columns.append(texts if place in table.text_columns else [*map(ascii_of, texts)])
     for number, part in enumerate(_parts(table, columns, out.width)):
         if number:
             out.print()
@@ -64,12 +67,6 @@ def show_table(table: Table, out: Console) -> None:
         out.print(grid)
 
 
-def _texts(table: Table, place: int) -> list[str]:
-    """Return a column's texts; numbers, and what is subtracted, in ASCII."""
-    texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
-    return texts if place in table.text_columns else [*map(ascii_of, texts)]
-
-
 def ascii_of(number: str) -> str:
     """Return a number as `roadeval.data.words` writes it, with a hyphen for minus and dash."""
     signs = f"{words.MINUS}{words.DASH}\N{ALMOST EQUAL TO}"
@@ -77,9 +74,9 @@ def ascii_of(number: str) -> str:
 
 
 def _parts(table: Table, columns: Sequence[Sequence[str]], room: int) -> Iterator[list[int]]:
-    """Part the columns of numbers into those that fit beside the words, one at least a part.
+    """Divide the columns of numbers into parts that fit beside the names.
 
-    As few parts as there can be, of about as many columns each: none is left alone below.
+    There are as few parts as possible, with about as many columns each, and at least one.
     """
     from rich.cells import cell_len
 

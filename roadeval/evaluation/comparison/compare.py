@@ -57,6 +57,7 @@ from roadeval.evaluation.tables import (
     rates_of,
     values_of,
 )
+from roadeval.runtime.sentence import Sentence, Setting
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -236,6 +237,8 @@ def compare(
         if across_variants:
             old = replace(base, variants={base.label: new.label})
             matched, left = [(drive, drive) for drive in base.scored], []
+        if not matched:
+            raise ComparisonError(_why_incomparable(old, new))
         part = _compare_two(old, new, matched, settings, across_variants=across_variants)
         parts.append(replace(part, warnings=(*left, *part.warnings)))
     changes = [*chain(*(part.changes for part in parts))]
@@ -257,6 +260,17 @@ def compare(
     )
 
 
+def _why_incomparable(base: Side, new: Side) -> str:
+    """Return why two results have no drive in common."""
+    for side in (new, base):
+        if any(drive.digest is None for drive in side.scored):
+            return f"{side.label} does not say which log it is of, so nothing can be compared"
+    return (
+        f"{base.label} and {new.label} are of different drives, whose difference would mix the "
+        "scene with the method; compare results of the same drives"
+    )
+
+
 def _compare_two(
     base: Side,
     new: Side,
@@ -269,16 +283,6 @@ def _compare_two(
     import pandas as pd
 
     labels = base.label, new.label
-    if not matched:
-        for side in (new, base):
-            if any(drive.digest is None for drive in side.scored):
-                raise ComparisonError(
-                    f"{side.label} does not say which log it is of, so nothing can be compared"
-                )
-        raise ComparisonError(
-            f"{base.label} and {new.label} are of different drives, whose difference would mix the "
-            "scene with the method; compare results of the same drives"
-        )
     several = len({drive.drive for _, drive in matched}) > 1
     groups = _groups(new, matched)
     base_keys = {drive.key: old.key for old, drive in matched}
@@ -529,14 +533,17 @@ def _warnings(
                 "lacks them or trained on them"
             )
     of_the_log = [
-        f"`{name}` {setting(before)} and {setting(after)}"
+        Sentence("{} {} and {}", Setting(name), setting(before), setting(after))
         for name, (before, after) in changed.items()
         if name.startswith(_OF_THE_LOG)
     ]
     if of_the_log:
-        yield (
-            f"{base} and {new} were replayed with different settings ({', '.join(of_the_log)}):"
-            " part of the change may be theirs"
+        yield Sentence(
+            "{} and {} were replayed with different settings ({}): part of the change may be "
+            "theirs",
+            base,
+            new,
+            Sentence(", ").join(of_the_log),
         )
     if relabelled := frames["relabelled"]:
         guess = "" if of_the_log else " (other labels or topics?)"

@@ -40,6 +40,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import ComparedResult, Comparison, MaskChange
 from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.runtime.sentence import Sentence
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     ">": operator.gt,
@@ -127,7 +128,7 @@ class Condition:
 
     def not_judged(self, result: str, because: str) -> Judgement:
         """Return the judgement that it could not be judged on a result, and why."""
-        why = f"{self.text}: not judged in {result}, because {because}"
+        why = Sentence("{}: not judged in {}, because {}", self.text, result, because)
         nan = math.nan
         return Judgement(self, result, 0, nan, nan, nan, None, None, None, why)
 
@@ -185,9 +186,12 @@ def _why_not_judged(
     base, new = results[0], next(result for result in results if result.label == mask.result)
     names = f"{base.label} and {new.label}"
     if None not in (base.scale, new.scale) and base.scale != new.scale:
-        return (
-            f"{names} were replayed with `frames.scale` {base.scale:g} and {new.scale:g}; replay "
-            "both at one scale, or limit in %"
+        return Sentence(
+            "{} were replayed with {frames.scale} {} and {}; replay both at one scale, or "
+            "limit in %",
+            names,
+            f"{base.scale:g}",
+            f"{new.scale:g}",
         )
     if new.relabelled:
         return (

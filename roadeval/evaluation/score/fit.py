@@ -1,9 +1,9 @@
-"""Whether truth, masks and images belong together: of the same frame, the same side and place.
+"""Whether truth, masks and images belong together: to the same frame, side and place.
 
-Edges of a mask lie on edges of the image it was made of, and near those of the truth, whatever the
-mask gets wrong. So the edges of the truth, and of each mask from elsewhere, are held against their
-frame and its neighbours, as they are, mirrored, upside down and moved. What fits much better than
-the plain pairing, in nearly all frames, is a finding. No number changes by it.
+Edges of a mask lie on edges of its image, and near edges of the truth, whatever the mask gets
+wrong. So the edges of the truth, and of each mask from elsewhere, are compared with their frame and
+its neighbours: plainly, mirrored, upside down and moved. A change that fits much better than the
+plain pairing, in nearly all frames, is a finding. Findings change no number.
 """
 
 from __future__ import annotations
@@ -23,52 +23,53 @@ from roadeval.data import IGNORE, ROAD, Frame, Packed
 from roadeval.data.arrays import Floats, Places, Plane
 
 TRUTH: Final = "truth"
-"""The subject that is no mask of a method."""
+"""The subject that is not a method's mask."""
 SPOTS: Final = 20
-"""Frames of a drive that are looked at, spread evenly."""
+"""Number of frames of a drive that are examined, spread evenly."""
 LAST_LAG: Final = 5
-"""Frames before and after each of them."""
+"""Number of frames before and after each of them that are examined too."""
 _FAR: Final = 15
-"""Pixels that a mask may have been moved by."""
+"""Greatest move of a mask in pixels."""
 _WIDEST: Final = 640
-"""Columns of the images that are looked at: larger ones are reduced."""
+"""Greatest width of examined images in pixels; larger ones are reduced."""
 _SMALLEST: Final = 96
-"""Rows and columns of images, at least, that are looked at."""
+"""Least height and width of examined images in pixels."""
 _MARGIN: Final = _FAR + 2
-"""Pixels at the image's border whose edges do not count: those of what was moved in from beyond."""
+"""Pixels at the image's border whose edges do not count: a move may bring them in from beyond."""
 _POINTS: Final = 200
-"""Points of a mask's edge that are looked at, about."""
+"""Approximate number of points of a mask's edge that are examined."""
 _REACH: Final = 20
-"""Pixels from another mask's edge up to which distances are told apart."""
+"""Greatest distance from another mask's edge that is measured, in pixels."""
 _NEAR: Final = 3.0
-"""Pixels of a move that is named, at least: masks of many a method lie a little off."""
+"""Least move that is named, in pixels: the masks of many methods lie a little off."""
 _CLEAR: Final = 0.7
-"""Nearness to the truth of masks whose outline is clear: these tell a move from growth."""
+"""Nearness to the truth above which a mask's outline is clear, so a move differs from growth."""
 _IMAGE: Final = 1.5
-"""How much more the image's edges count than the truth's where a move is looked for."""
+"""Weight of the image's edges relative to the truth's in the search for a move."""
 _LEAST: Final = 6
-"""Spots without which nothing is found."""
+"""Number of spots that a finding needs."""
 _SURE: Final = 2.5
 """Least mean gain of what fits better over the spots, in standard errors."""
 _MUCH: Final = 0.04
 """Least mean gain, as a share of how well the plain pairing fits."""
 _STILL: Final = 0.005
-"""Share of pixels whose truth changes from spot to spot, on average, up to which a scene stands
-still: there a bad method's masks cannot be told from moved ones."""
+"""Mean share of pixels whose truth changes between spots, up to which a scene stands still: then
+a bad method's masks cannot be told from moved ones."""
 _UPSIDE: Final = 0.4
-"""How much more road lies high in the image than before the vehicle where both are exchanged."""
+"""Least excess of the share of road high in the image over the share before the vehicle, if road
+and the rest are exchanged."""
 _SQUARE: Final = np.mgrid[-_FAR : _FAR + 1, -_FAR : _FAR + 1].reshape(2, -1, 1)
 _MOVES: Final = _SQUARE[:, np.hypot(*_SQUARE[:, :, 0]) <= _FAR]
 """``(2, K, 1)``: pixels down and to the right."""
 _STAY: Final = np.zeros((2, 1, 1), np.intp)
 _GROWTHS: Final = np.arange(-8, 9)
-"""Pixels that an edge may lie farther out or in all around: a method's way, and no finding."""
+"""Pixels by which a whole edge may lie farther out or in: that is a method's style, no finding."""
 _NEARNESS: Final = 1 / (1 + ((np.arange(-_REACH, _REACH + 1)[:, None] - _GROWTHS) / 2.5) ** 2)
 """``(distances, growths)``: how near a point lies to an edge once its mask is grown so far."""
 
 
 class Misfit(StrEnum):
-    """How a subject does not fit."""
+    """The way in which a subject does not fit."""
 
     LAG = "lag"
     MIRRORED = "mirrored"
@@ -79,10 +80,10 @@ class Misfit(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A subject that does not fit the images, and the change by which it would."""
+    """A subject that does not fit the images, and the change after which it does."""
 
     subject: str
-    """`TRUTH`, or the name of the variant whose masks they are."""
+    """`TRUTH`, or the name of the variant of the masks."""
     misfit: Misfit
     frames: int = 0
     """Frames by which the subject is late; below 0 it is early. 0 unless it lags."""
@@ -99,7 +100,7 @@ _Slopes = npt.NDArray[np.complex64]
 
 @dataclass(frozen=True, eq=False)
 class _Mask:
-    """The edge of a mask that is held against images and other masks."""
+    """The edge of a mask that is compared with images and other masks."""
 
     x: Places
     y: Places
@@ -108,8 +109,8 @@ class _Mask:
     distances: Plane
     """``(H, W)``: distance to the edge, `_REACH` at it, less inside, more outside."""
 
-    def turned(self, way: int) -> _Mask:
-        """Return it with left and right exchanged where ``way`` is 1, or upside down where 0."""
+    def turn(self, way: int) -> _Mask:
+        """Return it with left and right exchanged if ``way`` is 1, or upside down if it is 0."""
         last = self.distances.shape[way] - 1
         x, y = (last - self.x, self.y) if way else (self.x, last - self.y)
         normals = -self.normals.conj() if way else self.normals.conj()
@@ -169,11 +170,11 @@ def _mask(road: Plane, ignored: Plane) -> _Mask:
 
 
 def _fit(mask: _Mask, image: _Slopes, other: _Points | None, moves: npt.NDArray[np.intp]) -> Floats:
-    """Return how well a mask fits an image and another mask's edge once moved back.
+    """Return how well a mask fits an image and another mask's edge after it is moved back.
 
-    ``moves`` are ``(2, K, 1)``, or ``(2, K, n)`` where each point moves in a way of its own. What
-    is returned is ``(K, 1 + growths)``: the agreement with the image's edges, -1 to 1, and the
-    nearness to the other edge at each of `_GROWTHS`, 0 to 1, or NaN where there is none.
+    ``moves`` are ``(2, K, 1)``, or ``(2, K, n)`` if each point has its own move. Returned is
+    ``(K, 1 + growths)``: the agreement with the image's edges, -1 to 1, and the nearness to the
+    other edge at each of `_GROWTHS`, 0 to 1, or NaN if there is none.
     """
     steps = moves[0] * mask.distances.shape[1] + moves[1]
     place = mask.y * mask.distances.shape[1] + mask.x - steps
@@ -197,7 +198,7 @@ def _fit(mask: _Mask, image: _Slopes, other: _Points | None, moves: npt.NDArray[
 class FitCheck:
     """Collects, frame by frame in the drive's order, how well truth and masks fit.
 
-    So many ``spots`` among the ``numbers``, of which each ``stride``-th is read, are looked at,
+    ``numbers`` are the frames, of which each ``stride``-th is read; ``spots`` of them are examined,
     and their neighbours. Time and memory do not grow with the drive.
     """
 
@@ -206,23 +207,23 @@ class FitCheck:
         self._apart = (numbers[-1] - numbers[0]) / spots
         self._stride = stride
         self._shape: tuple[int, ...] = ()
-        """Shape of the first image; images of another size are not looked at."""
+        """Shape of the first image; images of another size are left out."""
         self._times = 1
-        """Columns and rows of it that become one."""
+        """Number of its columns, and of its rows, that become one."""
         self._recent: deque[_View] = deque(maxlen=LAST_LAG)
         self._open: list[tuple[int, dict[str, _Mask]]] = []
-        """Frame and masks of the spots whose later neighbours are still to come."""
+        """Frame and masks of the spots that still wait for later neighbours."""
         self._fits = defaultdict[Finding, dict[int, Floats]](dict)
-        """By change and frame of a spot; a lag of 0 is no change."""
+        """Fits by change and by frame of a spot; a lag of 0 is no change."""
         self._moves = defaultdict[str, list[tuple[Floats, Floats]]](list)
-        """By subject, for each spot: the fit at each of `_MOVES`, and, where it stays, the
+        """By subject, for each spot: the fit at each of `_MOVES`, and, without a move, the
         agreement with the image at each of `_GROWTHS`."""
         self._upside = defaultdict[str, list[float]](list)
         self._roads: list[Plane] = []
         """Road of the truth at each spot."""
 
     def add(self, frame: Frame, computed: Sequence[Packed] = ()) -> None:
-        """Look at the next frame; ``computed`` are the masks that were made of it here."""
+        """Examine the next frame; ``computed`` are the masks that this program made of it."""
         self._shape = self._shape or frame.image.shape
         self._times = -(-self._shape[1] // _WIDEST)
         if frame.image.shape != self._shape or min(self._shape[:2]) < _SMALLEST:
@@ -250,7 +251,7 @@ class FitCheck:
         return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _road(self, truth: Plane) -> tuple[Plane, Plane]:
-        """Return where road is, 255, and what is ignored, nonzero, of a truth."""
+        """Return the road of a truth as 255, and its ignored pixels as nonzero."""
         road, ignored = ((truth == code) * np.uint8(255) for code in (ROAD, IGNORE))
         return self._shrunk(road), self._shrunk(ignored)
 
@@ -268,7 +269,7 @@ class FitCheck:
         return _View(frame.number, image, truth, most)
 
     def _new_spot(self, frame: Frame, view: _View) -> dict[str, _Mask]:
-        """Note how a spot's subjects, turned and moved, fit its own frame; return them."""
+        """Note how a spot's subjects, turned and moved, fit its frame; return them."""
         subjects = {}
         for name, mask in frame.external.items():
             if mask.shape == self._shape[:2]:
@@ -287,12 +288,12 @@ class FitCheck:
                 grown = _fit(edge, view.image, None, outward)[:, 0]
                 self._moves[name].append((_fit(edge, view.image, view.truth, _MOVES), grown))
         for way, misfit in enumerate((Misfit.UPSIDE_DOWN, Misfit.MIRRORED)):
-            turned = {name: edge.turned(way) for name, edge in masks.items()}
+            turned = {name: edge.turn(way) for name, edge in masks.items()}
             self._note(frame.number, turned, view, misfit)
         return masks
 
     def _note(self, spot: int, masks: dict[str, _Mask], view: _View, misfit: Misfit) -> None:
-        """Note how a spot's subjects fit its frame, or one before or after it."""
+        """Note how a spot's subjects fit its frame, or a frame before or after it."""
         steps, rest = divmod(spot - view.number, self._stride)
         if not rest and abs(steps) <= LAST_LAG:
             for name, mask in masks.items():
@@ -301,20 +302,20 @@ class FitCheck:
                 self._fits[change][spot] = _fit(mask, view.image, other, _STAY)
 
     def findings(self) -> Iterator[Finding]:
-        """Yield what does not fit, the truth first."""
+        """Yield the findings, the truth's first."""
         truth = self._finding(TRUTH, alone=False)
         names = (name for name in self._upside if name != TRUTH)
         masks = (self._finding(name, alone=truth is not None) for name in names)
         yield from (finding for finding in (truth, *masks) if finding is not None)
 
     def _finding(self, name: str, *, alone: bool) -> Finding | None:
-        """Return what is sure about a subject, by the images ``alone`` or by the truth as well."""
+        """Return the sure finding on a subject, from images ``alone`` or from the truth as well."""
         plain = self._fits[Finding(name, Misfit.LAG)]
         if len(plain) < _LEAST:
             return None
         gains = {}
         for change, fits in self._fits.items():
-            # Masks computed here may have learnt that truth is mirrored, but not that it is late.
+            # Masks computed here may have learnt from mirrored truth, but not from late truth.
             images_only = alone or (name == TRUTH and change.misfit is not Misfit.LAG)
             if change.subject == name and fits is not plain:
                 gains[change] = _gain(plain, fits, images_only=images_only)
@@ -333,7 +334,7 @@ class FitCheck:
 
 
 class _Gain(NamedTuple):
-    """How much better something fits on average: plainly, in standard errors, and as a share."""
+    """The mean gain in fit: plainly, in standard errors, and as a share."""
 
     mean: float = 0.0
     errors: float = 0.0
@@ -341,7 +342,7 @@ class _Gain(NamedTuple):
 
     @classmethod
     def of(cls, before: Floats, after: Floats) -> _Gain:
-        """Return the gain from fits of each spot, ``(spots,)``, to those after a change."""
+        """Return the gain from the fits of the spots, ``(spots,)``, to the fits after a change."""
         gain = after - before
         mean = float(gain.mean())
         error = max(float(gain.std(ddof=1)) / math.sqrt(len(gain)), 1e-9)
@@ -349,27 +350,27 @@ class _Gain(NamedTuple):
 
 
 def _gain(plain: dict[int, Floats], changed: dict[int, Floats], *, images_only: bool) -> _Gain:
-    """Return how much better a change fits than the plain pairing; 0 where few spots tell."""
+    """Return how much better a change fits than the plain pairing; 0 if spots are too few."""
     spots = [spot for spot in changed if spot in plain]
     if len(spots) < _LEAST:
         return _Gain()
     fits = np.array([[change[spot][0] for spot in spots] for change in (plain, changed)])
     fits[:, images_only | np.isnan(fits).any(axis=(0, 2)), 1:] = 0
-    # How far a method's edges lie out or in is its way, before and after the change.
+    # A method's edges may lie out or in by any distance, before and after the change.
     return _Gain.of(*(fit[:, 0] + fit[:, 1 + fit[:, 1:].mean(axis=0).argmax()] for fit in fits))
 
 
 def _best_move(name: str, spots: Sequence[tuple[Floats, Floats]]) -> tuple[Finding, _Gain]:
-    """Return the move that fits best, and its gain over edges that lie out or in all around.
+    """Return the move that fits best, and its gain over edges that lie out or in as a whole.
 
-    Of so many moves one always fits better by chance. So the gain at every spot is that of the
-    move that fits best at the others.
+    Among many moves one always fits better by chance. So the gain at each spot is computed for the
+    move that fits best at the other spots.
     """
     fits, grown = (np.array(values) for values in zip(*spots, strict=True))
 
     def best(mean: Floats) -> tuple[int, list[int]]:
-        # Masks made of the image's edges lie on these exactly, but a little off the truth; learnt
-        # ones the other way round. What stands out higher over the moves tells the place.
+        # Masks made of the image's edges lie exactly on these, but a little off the truth; learnt
+        # masks do the opposite. The fit that stands out more over the moves decides.
         clear = np.array([mean[:, 0], mean[:, 1:].max(axis=1)])
         clear = np.maximum(clear - np.median(clear, axis=1, keepdims=True), 0) ** 2
         move = int((_IMAGE * clear[0] + clear[1]).argmax())
@@ -381,7 +382,7 @@ def _best_move(name: str, spots: Sequence[tuple[Floats, Floats]]) -> tuple[Findi
     gain = _Gain.of(still[:, still.mean(axis=0).argmax()], after)
     move = best(fits.mean(axis=0))[0]
     down, right = _MOVES[:, move, 0].tolist()
-    # The slanted sides of a road that is grown lie as if it were moved up. Where moves farther off
+    # The slanted sides of a road that has grown lie as if it were moved up. If moves farther away
     # bring a clear outline as near to the truth, nothing is sure.
     near = fits[:, :, 1:].mean(axis=0).max(axis=1)
     apart = np.hypot(_MOVES[0] - down, _MOVES[1] - right)[:, 0] >= _NEAR
@@ -392,7 +393,7 @@ def _best_move(name: str, spots: Sequence[tuple[Floats, Floats]]) -> tuple[Findi
 
 
 def _share_above(road: Plane, ignored: Plane) -> float:
-    """Return the share of road in the upper quarter less that before the vehicle; -1 to 1."""
+    """Return the share of road in the upper quarter minus the share before the vehicle; -1 to 1."""
     height, width = road.shape
     upper = slice(0, height // 4), slice(None)
     before = slice(-height // 4, None), slice(width // 3, -(width // 3))

@@ -15,7 +15,7 @@ from roadeval.evaluation.comparison.compare import compare as compare_sides
 from roadeval.evaluation.comparison.conditions import Condition, Judgement, judge
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
-from roadeval.evaluation.tables import finals, joined, only, values_of, windows
+from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
@@ -248,7 +248,7 @@ def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], pd.DataFr
             parts.append(in_all.assign(variant=name, stage="final"))
     if not parts:
         return None
-    return masks, joined(parts).sort_values("frame", kind="stable")
+    return masks, concatenate(parts).sort_values("frame", kind="stable")
 
 
 def _frames(side: Side) -> pd.DataFrame:
@@ -267,7 +267,7 @@ def over_drive(compared: Compared) -> list[Chart]:
         return []
     masks, rows = common
     blind = finals(only(_frames(compared.sides[0]), variant=BASELINE))
-    rows = joined([rows, blind[blind["frame"].isin(rows["frame"])].assign(stage="final")])
+    rows = concatenate([rows, blind[blind["frame"].isin(rows["frame"])].assign(stage="final")])
     size = compared.comparison.settings.window
     size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
     rows = rows.assign(drive="", camera="")  # the results may call them differently

@@ -37,7 +37,7 @@ PNG: Final = "png"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PickedFrames:
     """The frames that a command has picked."""
 
     folder: Path
@@ -67,7 +67,7 @@ def pick(
     variant: str | None = None,
     seed: int = 0,
     on_progress: OnProgress = ignore,
-) -> list[Outcome]:
+) -> list[PickedFrames]:
     """Pick frames of logs without truth to label: half drawn at random, half most in doubt.
 
     Parameters
@@ -175,7 +175,7 @@ class _Request:
     """The configuration as TOML, of a log that was replayed here; None of a recording."""
 
 
-def _pick_frames(drive: DriveResult, request: _Request) -> Outcome:
+def _pick_frames(drive: DriveResult, request: _Request) -> PickedFrames:
     """Pick frames of a recording and write them."""
     rows = drive.table("unlabelled")
     names = values_of(rows, "variant")
@@ -210,7 +210,7 @@ def _pick_frames(drive: DriveResult, request: _Request) -> Outcome:
     _write_picks(drive, picks, [(frame, masks[frame.frame]) for frame in new], request)
     log = drive.facts.log
     repeats = request.folder / RUN if request.run else drive.path
-    return Outcome(request.folder, picks, len(new), log.path if log else drive.name, repeats)
+    return PickedFrames(request.folder, picks, len(new), log.path if log else drive.name, repeats)
 
 
 def _read_picks(drive: DriveResult, doubts: pd.DataFrame, variant: str, request: _Request) -> Picks:

@@ -17,7 +17,7 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.comparison.pairing import ComparedDrive
 from roadeval.evaluation.score.scoreboard import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import joined
+from roadeval.evaluation.tables import concatenate
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
     SUMMARY,
@@ -396,7 +396,9 @@ class Result:
     def windows(self) -> pd.DataFrame:
         """A row per window of evaluated frames, variant and stage of every drive."""
         size = self.facts.evaluation.window
-        return joined([tables.windows(result.table("frames"), size) for result in self._opened])
+        return concatenate(
+            [tables.windows(result.table("frames"), size) for result in self._opened]
+        )
 
     def table(self, name: str, drives: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
         """Return a table of all drives, or of some, by drive and camera.
@@ -410,7 +412,7 @@ class Result:
                 parts.append(result.table(name, names))
             elif drives is None or result.key in drives:
                 parts.append(result.table(name))
-        return joined(parts)
+        return concatenate(parts)
 
 
 def _compared_drive(result: DriveResult) -> ComparedDrive:

@@ -15,13 +15,13 @@ from roadeval.errors import RoadevalError
 from roadeval.fleet.drives import (
     DriveEntry,
     FleetError,
-    cameras_apart,
     deal,
     find_drives,
     groups_of,
-    shuffled,
+    name_cameras,
+    shuffle,
 )
-from roadeval.fleet.engine import ATTEMPTS, died, started
+from roadeval.fleet.engine import ATTEMPTS, is_worker_death, start_workers
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
     Done,
@@ -40,6 +40,7 @@ from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.files import AnyPath, Paths, list_paths, sha256_of
+from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
 
@@ -97,13 +98,12 @@ def replay_fleet(
     config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in list_paths(drives)])
     if config.cameras:
-        entries = cameras_apart(
+        entries = name_cameras(
             [camera for entry in entries for camera in entry.of_cameras(config.cameras)]
         )
     if config.fleet.folds is not None and config.training.model is not None:
-        raise FleetError(
-            "`fleet.folds` and `training.model` do not go together: folds train models"
-        )
+        problem = Sentence("does not go with {training.model}: folds train models")
+        raise FleetError(problem, setting="fleet.folds")
     writer = FleetWriter(Path(output))
     writer.begin()
     run = FleetRun(
@@ -185,7 +185,7 @@ class FleetRun:
     def _engine(self) -> Executor:
         """Return who does the tasks."""
         if self.executor is None:
-            starting = started(self.config.run.jobs, self.config.fleet.scheduler)
+            starting = start_workers(self.config.run.jobs, self.config.fleet.scheduler)
             self.executor, count = self.stack.enter_context(starting)
             self.workers = max(count, 1)
         return self.executor
@@ -196,7 +196,7 @@ class FleetRun:
         configs = {entry.id: entry.config(settings) for entry in self.entries}
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
-        drawn = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
+        drawn = [by_id[drive] for drive in shuffle(by_id, settings.training.seed)]
         training = [
             FoldTask(
                 self.folder,
@@ -261,7 +261,7 @@ class FleetRun:
                     f"{self.folder}: the workers have gone, or their scheduler; what is done is "
                     "kept, and the same command again does the rest"
                 ) from error
-        if died(error):
+        if is_worker_death(error):
             return (
                 f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
                 "runs out"

@@ -50,7 +50,7 @@ from roadeval.results.schema import FAILED
 from roadeval.results.verdict import focus_of
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import alone, find_partial, put, sha256_of
+from roadeval.runtime.files import claim_files, find_partial, put, sha256_of
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import save_model
@@ -113,7 +113,7 @@ def replay_drive(task: DriveTask) -> Done:
     model = task.config.training.model
     if task.model and sha256_of(Path(model or "")) != task.model:
         raise FleetError(f"{model}: has changed since the command began; give it again")
-    with ending_the_run(task.folder), alone(made_path(task.folder, task.entry.id)):
+    with ending_the_run(task.folder), claim_files(made_path(task.folder, task.entry.id)):
         made, repeated = find_valid(task), True
         if made is None:
             made, repeated = _try_replay(task), False
@@ -308,7 +308,7 @@ def train_fold(task: FoldTask) -> FoldModel:
     """
     _check_software(task.software, task.config)
     about = task.path.with_suffix(".json")
-    with ending_the_run(task.folder), alone(task.path, about):
+    with ending_the_run(task.folder), claim_files(task.path, about):
         looks = [stamp_files(entry, config.for_training()) for entry, config in task.candidates]
         parts = [settings_digest(task.config, ""), looks]
         parts += [[entry.id, settings_digest(config, "")] for entry, config in task.candidates]
@@ -341,7 +341,7 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
     try:
         model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
     except TrainingError as error:
-        return FoldModel(task.fold, "", str(error))
+        return FoldModel(task.fold, "", error.sentence)
     save_model(model, task.path)
     digest = sha256_of(task.path)
     about_model = {

@@ -110,7 +110,7 @@ def run_frame(
     if variant not in pipelines:
         raise RoadevalError(f"there is no variant {variant}; there are {', '.join(pipelines)}")
     pipeline = pipelines[variant]
-    if model is None and pipeline.learning():
+    if model is None and pipeline.learning_stages():
         raise RoadevalError(f"variant {variant} needs a model: its stages learn")
     learnt = {} if model is None else model.parameters.get(variant, {})
     return run_variant(variant, pipeline.bind(learnt), View.of(image))

@@ -41,7 +41,8 @@ from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, reuse, trim
-from roadeval.runtime.threads import ordered
+from roadeval.runtime.sentence import Sentence
+from roadeval.runtime.threads import map_ordered
 from roadeval.training import learning
 from roadeval.training.learning import Schedule
 from roadeval.training.model import Model, ModelError
@@ -101,7 +102,7 @@ class Failures:
         for failures in self.by_error.values():
             frames = first_of([str(failure.frame) for failure in failures], KEPT)
             where = f"{len(failures)} frames ({frames})" if len(failures) > 1 else f"frame {frames}"
-            yield f"{where}: variant {failures[0].variant}: {failures[0].reason}"
+            yield Sentence("{}: variant {}: {}", where, failures[0].variant, failures[0].reason)
 
 
 SPARSE: Final = 5
@@ -214,21 +215,24 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     if picks and selection.truth and isinstance(selection.truth.pictures, NamedLabels):
         picks.check(selection.truth.pictures)
     if picks and config.frames.scale != 1:
-        raise RoadevalError("`frames.scale` and picked frames do not go together")
+        raise RoadevalError("does not go with picked frames", setting="frames.scale")
     labelled = selection.truth is not None
     stream = again()
     frames = len(stream)
     truths = frames if selection.truth is None else len(selection.truth.pictures)
     if frames > SPARSE * truths and picks is None:
-        note = f"at most {truths} of {frames} frames have road truth: "
-        note += "`frames.labelled` reads these alone"
+        note = Sentence(
+            "at most {} of {} frames have road truth: {frames.labelled} reads these alone",
+            truths,
+            frames,
+        )
         on_progress(Progress(0, None, "opening", note))
     learn = partial(_learn, again, variants, config.training, on_progress)
     model, schedule = learn(labelled=labelled, picks=picks)
     try:
         chains = bind(variants, model)
     except MisfitError as error:
-        raise ModelError(f"{config.training.model}: {error}") from error
+        raise ModelError.of(error, config.training.model) from error
     trim()
     masks = selection.masks
     layouts = (
@@ -383,7 +387,7 @@ def process(
 
     workers = runs[0].config.run.jobs or os.cpu_count() or 1
     work = partial(_process, encoder)
-    for position, (run, done) in enumerate(ordered(work, numbered(), workers), 1):
+    for position, (run, done) in enumerate(map_ordered(work, numbered(), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
             trim()
@@ -403,11 +407,14 @@ def process(
 def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
     """Return the error that ends a run in which the first frames failed, or all."""
     first, last = failures[0], failures[-1]
-    others = [f"`only` {layout.name}" for layout in run.layouts if layout.name != first.variant]
-    left_out = f", or leave the variant out with {' '.join(others)}" if others else ""
+    names = [layout.name for layout in run.layouts if layout.name != first.variant]
+    others = Sentence(" ").join(Sentence("{only} {}", name) for name in names)
+    remedy = Sentence("mend it, or leave the variant out with {}", others) if names else "mend it"
+    frames = f"the first {len(failures)} frames ({first.frame} to {last.frame})"
     return StageError(
-        f"variant {first.variant}: {first.reason}, on each of the first {len(failures)} frames "
-        f"({first.frame} to {last.frame}): mend it{left_out}"
+        Sentence("{}, on each of {}", first.reason, frames),
+        where=f"variant {first.variant}",
+        remedy=remedy,
     )
 
 
@@ -434,7 +441,7 @@ def _process(
             continue
         except StageError as error:
             where = "".join(traceback.format_exception(error))
-            return run, Failure(frame.number, role, name, str(error), where)
+            return run, Failure(frame.number, role, name, error.sentence, where)
         variants.append(variant_result)
     variants += [
         external_variant(name, mask, frame.probabilities.get(name))

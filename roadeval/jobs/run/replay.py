@@ -11,8 +11,8 @@ from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
 from roadeval.evaluation.score.scoreboard import DriveSums
-from roadeval.evaluation.tables import joined
-from roadeval.fleet.remote import readable
+from roadeval.evaluation.tables import concatenate
+from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
@@ -28,6 +28,7 @@ from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
+from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
 OnFrame = Callable[[FrameResult], None]
@@ -92,13 +93,13 @@ def replay(
     places = {"save": save, "reports": reports, "mcap": mcap}
     places_given = {name: str(path) for name, path in places.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": places_given}).resolved()
-    with open_log(readable(drive, config.run.patience_s), config) as log:
+    with open_log(open_source(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
             outcome = _replay_log(log, config, to, on_progress, on_frame)
             if to.recording is None and (save := config.output.save) is not None:
-                unwritten = f"`output.save` {save} is not written: `output.record` is none"
-                return replace(outcome, warnings=(*outcome.warnings, unwritten))
+                unwritten = "{output.save} {} is not written: {output.record} is none"
+                return replace(outcome, warnings=(*outcome.warnings, Sentence(unwritten, save)))
             return outcome
 
 
@@ -178,7 +179,7 @@ def _finish_recording(
         recorder.finish(ended[0].texts)
         return ended[0].facts
     by_camera = {run.camera: end for run, end in zip(runs, ended, strict=True)}
-    frames = joined([end.sums.frames for end in ended])
+    frames = concatenate([end.sums.frames for end in ended])
     camera_facts = {name: end.facts for name, end in by_camera.items()}
     facts = summary.join_cameras(frames, camera_facts, results.tables)
     # The seconds differ from run to run, see `_recorded_texts`.

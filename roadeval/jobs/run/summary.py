@@ -41,6 +41,7 @@ from roadeval.results.facts import (
 from roadeval.results.sentences import misfit
 from roadeval.results.tables import TableFacts
 from roadeval.results.verdict import verdict
+from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def make_facts(
     return Facts(
         **parts,
         effects=[*effects],
-        verdict=" ".join([*misfits, told, *varying]),
+        verdict=Sentence(" ").join([*misfits, told, *varying]),
         misfits=misfits,
         unlabelled=unlabelled,
         estimate=estimated,
@@ -86,7 +87,7 @@ def make_facts(
             *(run.selection.size or (0, 0)),
             rate_hz=run.selection.image.rate_hz,
             **sums.times,
-            topics=[*run.selection.reasons, *run.config.ignored()],
+            topics=[*run.selection.reasons, *run.config.ignored_settings()],
             calibration=run.calibration,
             ground=run.selection.ground_as_read,
         ),
@@ -197,11 +198,11 @@ def misfit_sentence(finding: Finding, selection: Selection, config: LogConfig) -
         first = pictures.first + finding.frames
         setting = "truth" if is_truth else f"masks.{finding.subject}"
         if pictures.by == "number" and first >= 0:
-            remedy = f"Set `{setting}.first` to {first}."
+            remedy = Sentence("Set {} to {}.", Setting(f"{setting}.first"), first)
     by_time = source is not None and isinstance(source.pairing.images, TopicReader)
     if finding.misfit is Misfit.LAG and is_truth and period_ms and by_time:
         offset = config.topics.sync_offset_ms - finding.frames * period_ms
-        remedy = f"Set `topics.sync_offset_ms` to {offset:.0f}."
+        remedy = Sentence("Set {topics.sync_offset_ms} to {}.", f"{offset:.0f}")
     pixels = {name: round(getattr(finding, name) / selection.scale) for name in ("right", "down")}
     finding = replace(finding, **pixels)
     return misfit(finding, period_ms, remedy)
@@ -218,7 +219,7 @@ def _best_thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
         stages = variant.pipeline.settings
         post = stages[FINAL_STAGE]
         is_final = all(getattr(post, key) == value for key, value in AS_IT_IS.items())
-        if is_final and not variant.pipeline.learning():
+        if is_final and not variant.pipeline.learning_stages():
             net = stages.get("net")
             lines_of[variant.name] = 0.5
             if net is not None and net.threshold is not None:
@@ -239,7 +240,9 @@ def join_cameras(
     by_camera = tables.totals(frames, ["camera", *tables.MASK])
     totals = tables.as_trees(tables.over_cameras(by_camera))
     effects = drive_effects(frames, first.evaluation)
-    misfits = [f"{name}: {text}" for name, facts in cameras.items() for text in facts.misfits]
+    misfits: list[str] = [
+        Sentence("{}: {}", name, text) for name, facts in cameras.items() for text in facts.misfits
+    ]
     claims: dict[str, dict[str, int]] = _add_counts(facts.claims for facts in cameras.values())
     accounts = [asdict(facts.frames) for facts in cameras.values()]
     skipped = Counter[str]()
@@ -249,7 +252,7 @@ def join_cameras(
     return replace(
         first,
         effects=effects,
-        verdict=" ".join([*misfits, verdict(totals, effects)]),
+        verdict=Sentence(" ").join([*misfits, verdict(totals, effects)]),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
@@ -286,7 +289,7 @@ def _name_cameras(sentences: Mapping[str, Sequence[str]]) -> Iterator[str]:
     common = [sentence for sentence in first if all(sentence in other for other in others)]
     yield from common
     for camera, of_camera in sentences.items():
-        yield from (f"{camera}: {sentence}" for sentence in of_camera if sentence not in common)
+        yield from (Sentence("{}: {}", camera, text) for text in of_camera if text not in common)
 
 
 def versions() -> dict[str, str]:
@@ -298,11 +301,12 @@ def versions() -> dict[str, str]:
 def warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield what a user should know before believing the results."""
     if missing := run.selection.no_truth:
-        yield f"there is no road truth to score against, only masks to look at: {missing}"
+        no_truth = "there is no road truth to score against, only masks to look at: {}"
+        yield Sentence(no_truth, missing)
         yield from _ranking_warnings(run)
     yield from _label_warnings(run)
     yield from (str(damage) for damage in run.log.damage if not damage.lossy)
-    yield from (f"{run.selection.image.name}: {note}" for note in run.selection.notes)
+    yield from (Sentence("{}: {}", run.selection.image.name, n) for n in run.selection.notes)
     yield from run.frames.accounting.notes
     yield from _size_warnings(run)
     yield from _network_warnings(run)
@@ -331,7 +335,7 @@ def _size_warnings(run: Run) -> Iterator[str]:
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
     if selection.ground and (lens := selection.calibration) and selection.calibration_why:
-        yield f"metres rest on {lens.topic}: {selection.calibration_why}"
+        yield Sentence("metres rest on {}: {}", lens.topic, selection.calibration_why)
 
 
 def _ranking_warnings(run: Run) -> Iterator[str]:
@@ -343,7 +347,7 @@ def _ranking_warnings(run: Run) -> Iterator[str]:
         )
         if unlabelled.sign not in RANKS_AT_ONCE:
             pictures = "kept no pictures: one method alone says nothing by which a frame could rank"
-        yield f"without truth `output.record` {rule} {pictures}"
+        yield Sentence("without truth {output.record} {} {}", rule, pictures)
 
 
 def _pick_warnings(run: Run) -> Iterator[str]:
@@ -379,9 +383,10 @@ def _network_warnings(run: Run) -> Iterator[str]:
     for name, stages in run.methods.items():
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
         if probable and not name.endswith(TUNED):
-            yield (
-                f"{name}: the network's output is taken for probabilities, for it stays within 0 "
-                "and 1; if it holds logits, write `activation` in its file"
+            yield Sentence(
+                "{}: the network's output is taken for probabilities, for it stays within 0 and "
+                "1; if it holds logits, set {net.activation}",
+                name,
             )
 
 
@@ -400,7 +405,7 @@ def _tuning_warnings(run: Run) -> Iterator[str]:
     for variant in run.variants:
         if "threshold" in variant.pipeline.settings:
             yield f"{variant.name}: its threshold is the one with the fewest errors on {where}"
-        elif variant.pipeline.heard():
+        elif variant.pipeline.heard_stages():
             method = variant.name.removesuffix(TUNED)
             yield (
                 f"{variant.name}: learnt on {where}, on top of what {method} says: its rates are "
@@ -417,10 +422,11 @@ def _label_warnings(run: Run) -> Iterator[str]:
         )
     if run.selection.truth is not None and not run.frames.accounting.labelled:
         stride = run.config.frames.every
-        why = f": `frames.every` {stride} leaves out each one that has" if stride > 1 else ""
-        yield (
-            f"none of the frames that were read has road truth{why}; `frames.labelled` reads only "
-            "frames that have"
+        why = Sentence(": {frames.every} {} leaves out each one that has", stride)
+        yield Sentence(
+            "none of the frames that were read has road truth{}; {frames.labelled} reads only "
+            "frames that have",
+            why if stride > 1 else "",
         )
 
 
@@ -445,7 +451,8 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
             )
         if unused := masks.pairing.unused:
             yield f"{shown}: {unused} labels of {where} belong to no frame"
-        yield from (f"{shown}: {where}: {note}" for note in (*masks.notes, *masks.meaning.notes))
+        notes = (*masks.notes, *masks.meaning.notes)
+        yield from (Sentence("{}: {}: {}", shown, where, note) for note in notes)
     yield from run.frames.unpaired()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from roadeval.config.run import RunConfig
 from roadeval.data import Frame
 from roadeval.fleet.drives import DriveEntry, find_drives
-from roadeval.fleet.remote import readable
+from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.logs.frames import FrameStream
@@ -65,7 +65,7 @@ def draw(
     Where they must be ``labelled``, a drive without road truth gives none.
     """
     frames, streams = list[Frame](), list[FrameStream]()
-    with open_log(readable(drive.source, config.run.patience_s), config.for_training()) as log:
+    with open_log(open_source(drive.source, config.run.patience_s), config.for_training()) as log:
         selection = log.select()
         if labelled and selection.truth is None:
             return [], []

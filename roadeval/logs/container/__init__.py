@@ -5,8 +5,9 @@ package salvages MCAP: the library stops at the first record that makes no sense
 log whose recorder was killed, whose chunks are damaged, or whose summary is missing or wrong.
 
 A sound log takes the same walk, because only a walk shows that a log is sound, and a second way to
-read would be more code. The library opens a short log 1 ms faster. But it makes an object of each
-message: a log of 200,000 messages takes 10 times as long to open, and 8 times as long to read.
+read would be more code. The library is faster with a log of images: it opens one of 8 MB 1 ms
+faster, and reads it in two thirds of the time. But it makes an object of each message: a log of
+200,000 messages takes 10 times as long to open, and 8 times as long to read.
 
 - ``records``: bytes by position, records, chunks and the summary
 - ``scan``: the walk from record to record, across damage

@@ -29,6 +29,7 @@ from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, Topi
 from roadeval.logs.messages.frame_numbers import FrameNumbers
 from roadeval.logs.settings import parse_time
 from roadeval.runtime.discovery import collect
+from roadeval.runtime.sentence import Sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,7 +358,7 @@ class Video:
                 unit.pts = unit.dts = position
                 self._take(decoder, unit, waiting)
             except (BadMessage, FrameError) as error:
-                self._ready[position] = FrameError(str(error))
+                self._ready[position] = FrameError.of(error)
                 broken = broken or LOST
             yield True
         if decoder is not None:
@@ -417,21 +418,25 @@ class Video:
         if share > 0.02:  # compression explains less
             self.notes.setdefault(
                 "range",
-                f"{100 * share:.0f} % of the luma of frame {frame.pts} lies beyond 16 to 235, and "
-                "the video does not say which range it has: if it is the full one, as of converted "
-                "JPEGs, set `frames.full_range`",
+                Sentence(
+                    "{} % of the luma of frame {} lies beyond 16 to 235, and the video does not "
+                    "say which range it has: if it is the full one, as of converted JPEGs, set "
+                    "{frames.full_range}",
+                    f"{100 * share:.0f}",
+                    frame.pts,
+                ),
             )
 
     def _reason(self, decoder: Any, error: Any) -> str:
         """Return why a packet cannot be decoded: its size, if the decoder knows it."""
         reason = f"its video cannot be decoded: {error.strerror}"
         if not (decoder.width and decoder.height):
-            most = f"{self._limits.max_pixels} pixels that `frames.max_pixels` allows"
-            return f"{reason}, or it has more than the {most}"
+            most = "{}, or it has more than the {} pixels that {frames.max_pixels} allows"
+            return Sentence(most, reason, self._limits.max_pixels)
         try:
             self._limits.check(decoder.width, decoder.height)
         except ImageError as too_large:
-            return str(too_large)
+            return too_large.sentence
         return reason
 
 

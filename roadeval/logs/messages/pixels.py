@@ -203,7 +203,7 @@ def _bad_message() -> Iterator[None]:
     try:
         yield
     except ImageError as error:
-        raise BadMessage(str(error)) from error
+        raise BadMessage.of(error) from error
 
 
 def _is_depth(picture: CompressedPicture) -> bool:

@@ -21,6 +21,7 @@ from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.topics.choose import words
 from roadeval.logs.topics.reader import TopicInfo, TopicReader
+from roadeval.runtime.sentence import Sentence
 
 OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
 """The rotation from a camera's axes to those of a vehicle: x ahead, y left, z up (REP 103)."""
@@ -33,7 +34,6 @@ LensAndNote = tuple[Calibration | None, str]
 
 RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undistorted"})
 """Words in the topics of images without distortion."""
-_ADVICE: Final = "give its lens with `ground`"
 
 
 def is_rectified(name: str) -> bool:
@@ -68,7 +68,7 @@ def calibration_of(
     (topic,) = best
     frame, lens, why = matching[topic]
     if lens is None:
-        return None, f"{topic}: {why}"
+        return None, Sentence("{}: {}", topic, why)
     reader = readers[topic]
     with suppress(*_UNREADABLE):
         last, _ = _lens_in(topic, reader.fields(len(reader) - 1), image)
@@ -87,7 +87,7 @@ def calibration_of(
         notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read so")
         mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
         lens = replace(lens, frame_id=f"{frame}_optical")
-    return replace(lens, mounting=mounting), "; ".join(notes)
+    return replace(lens, mounting=mounting), Sentence("; ").join(notes)
 
 
 def _shared_parts(one: str, other: str) -> int:
@@ -103,7 +103,8 @@ def _read_lens(
 
     Some drivers send zeros until they are ready. A few messages are read, ever farther apart.
     """
-    frame, why = "", "no message can be read"
+    frame: str = ""
+    why: str = "no message can be read"
     positions = {0, *(1 << power for power in range(7)), len(reader) - 1}
     for position in sorted(positions & {*range(len(reader))}):
         try:
@@ -111,7 +112,8 @@ def _read_lens(
             frame = str(getattr(message, "header", message).frame_id)
             lens, why = _lens_in(topic.name, message, image)
         except _UNREADABLE:
-            why = f"its {topic.encoding} messages of {topic.schema} cannot be read: {_ADVICE}"
+            unread = "its {} messages of {} cannot be read: give its lens with {ground}"
+            why = Sentence(unread, topic.encoding, topic.schema)
             continue
         if lens is not None:
             return frame, lens, why
@@ -132,7 +134,8 @@ def _lens_in(topic: str, message: Any, image: TopicInfo) -> LensAndNote:
     if is_rectified(image.name):
         flat = replace(lens, matrix=(*p[:3], *p[4:7], *p[8:11]), model="", distortion=())
         if lens.bends and not any(p):
-            return None, f"its projection P is zero, and the images are rectified: {_ADVICE}"
+            zero = "its projection P is zero, and the images are rectified: "
+            return None, Sentence(zero + "give its lens with {ground}")
         if lens.bends and np.array_equal(flat.matrix, lens.matrix):
             note = "the images are taken as not rectified: P is K, and there is distortion"
         elif any(p):
@@ -140,7 +143,7 @@ def _lens_in(topic: str, message: Any, image: TopicInfo) -> LensAndNote:
     if lens.problem:
         return None, f"its {lens.problem}"
     fitting, remark = _fit_to_size(lens, message, image.size or size)
-    return fitting, "; ".join(filter(None, (note, remark)))
+    return fitting, Sentence("; ").join(filter(None, (note, remark)))
 
 
 def _fit_to_size(full: Calibration, message: Any, size: Size) -> LensAndNote:
@@ -164,7 +167,7 @@ def _fit_to_size(full: Calibration, message: Any, size: Size) -> LensAndNote:
     for lens in (part, full):
         if lens.has_shape(*size):
             note = f"it is for images of {lens.width}x{lens.height}, and scaled"
-            return lens.scaled(*size), "; ".join(filter(None, (note, lens.doubt)))
+            return lens.scaled(*size), Sentence("; ").join(filter(None, (note, lens.doubt)))
     return None, f"it is for images of {part.width}x{part.height}"
 
 

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.reader import TopicInfo
+from roadeval.runtime.sentence import Sentence
 
 
 def _set(text: str) -> frozenset[str]:
@@ -63,7 +64,7 @@ def choose_image(topics: Sequence[TopicInfo], setting: str | None) -> tuple[Topi
     A `LogError` if the named topic is missing or no image, or if none or several are candidates.
     """
     if setting is not None:
-        return named(topics, setting, "`topics.image`"), "asked for"
+        return named(topics, setting, "topics.image"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
     colours = [
@@ -83,14 +84,12 @@ def choose_image(topics: Sequence[TopicInfo], setting: str | None) -> tuple[Topi
         why = "the only camera image" if len(images) > 1 else "the only image topic"
         return cameras[0], f"{why}, of {len(colours)} transports" if len(colours) > 1 else why
     if cameras:
-        raise LogError(
-            f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`, or "
-            "give it once for each of several"
-        )
+        choose = "choose one with {topics.image}, or give it once for each of several"
+        problem = f"{len(cameras)} image topics: {_names(cameras)}"
+        raise LogError(problem, remedy=Sentence(choose))
     if images:
-        raise LogError(
-            f"only label images: {_names(images)}; choose the camera's with `topics.image`"
-        )
+        choose = Sentence("choose the camera's with {topics.image}")
+        raise LogError(f"only label images: {_names(images)}", remedy=choose)
     listed = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
     more = ", ..." if len(topics) > 8 else ""
     raise LogError(f"no image topic; the log has: {listed or 'no topics at all'}{more}")
@@ -112,13 +111,13 @@ def choose_truth(
     name values, and the only label images are compressed with loss.
     """
     if setting is not None:
-        return _named_choice(topics, setting, "`topics.truth`")
+        return _named_choice(topics, setting, "topics.truth")
     candidates = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
     roads = [topic for topic in candidates if not topic.lossy]
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
     of_camera = [topic for topic in roads if topic.name not in elsewhere]
     colors = bool(labels.road_colors)
-    truth = _only(_clear_truths(of_camera, image, colors=colors), image, "label", "`topics.truth`")
+    truth = _only(_clear_truths(of_camera, image, colors=colors), image, "label", "topics.truth")
     if truth is not None:
         by = "colours" if truth.channels == 3 else "single channel"
         return Choice(truth, f"the label image, by its name and its {by}")
@@ -128,12 +127,15 @@ def choose_truth(
         if of_rig:
             return Choice(None, why)
         raise LogError(
-            f"{why}: name it with `topics.truth` to use it nevertheless, or give an empty name "
-            "there to continue without truth"
+            why,
+            remedy=Sentence(
+                "name it with {topics.truth} to use it nevertheless, or give an empty name there "
+                "to continue without truth"
+            ),
         )
     if roads:
-        why = "no topic is clearly road truth; name one with `topics.truth`:"
-        return Choice(None, f"{why} {_names(roads)}")
+        why = Sentence("no topic is clearly road truth; name one with {topics.truth}")
+        return Choice(None, Sentence("{}: {}", why, _names(roads)))
     if not candidates:
         return Choice(None, "no label topic")
     why = lossy_labels(candidates[0].name, candidates[0].lossy)
@@ -164,7 +166,7 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, setting: str | 
     A `LogError` if the named topic is missing or no image, or if several are candidates.
     """
     if setting is not None:
-        return _named_choice(topics, setting, "`topics.shadow`")
+        return _named_choice(topics, setting, "topics.shadow")
     shadows = [
         topic
         for topic in _label_topics(topics, image)
@@ -173,7 +175,7 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, setting: str | 
         and not topic.lossy
         and not other_camera(topic, image, topics)
     ]
-    shadow = _only(shadows, image, "shadow", "`topics.shadow`")
+    shadow = _only(shadows, image, "shadow", "topics.shadow")
     why = "the shadow mask, by its name and its single channel" if shadow else "no shadow topic"
     return Choice(shadow, why)
 
@@ -236,7 +238,8 @@ def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicIn
     else:
         return
     pattern = re.sub(r"\d+[^/]*$", "*", min(cameras.values()))
-    raise LogError(f"{problem}: choose those that count by `truth.names`, as '{pattern}'")
+    choose = Sentence("choose those that count by {truth.names}, as '{}'", pattern)
+    raise LogError(problem, remedy=choose)
 
 
 def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
@@ -273,12 +276,12 @@ def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
     for topic in topics:
         if topic.name == name and topic.is_image:
             if not topic.count:
-                raise LogError(f"{setting} {name}: the topic holds no message")
+                raise LogError(f"{name} holds no message", setting=setting)
             return topic
     valid = _names(topic for topic in topics if topic.is_image) or "none"
     there = any(topic.name == name for topic in topics)
     what = "carries no images" if there else "is not in the log"
-    raise LogError(f"{setting} {name}: {what}; its image topics are: {valid}")
+    raise LogError(f"{name} {what}", setting=setting, remedy=f"its image topics are: {valid}")
 
 
 def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:

@@ -125,7 +125,7 @@ def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
         try:
             return replace(topic, **_describe_picture(reader, position))
         except (FrameError, BadMessage) as error:
-            problem = problem or str(error)
+            problem = problem or error.sentence
         tries += not reader.is_lost(position)
         if tries == 3:
             break
@@ -268,7 +268,7 @@ class TopicReader:
                 return replace(picture, number=message.sequence)
             return picture
         except BadMessage as error:
-            raise self._error(position, str(error)) from error
+            raise self._error(position, error.sentence) from error
 
     def fields(self, position: int) -> Any:
         """Read a message of any kind; a `FrameError` or `BadMessage` if that fails."""
@@ -349,7 +349,7 @@ class TopicReader:
         return decoder_for(source.channel, source.schema)
 
     def _error(self, position: int, reason: str) -> FrameError:
-        return FrameError(f"{self.name} message {position}: {reason}")
+        return FrameError(reason, where=f"{self.name} message {position}")
 
 
 def topic_readers(

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import ParseError, XMLParser, fromstring
 
 import numpy as np
 
+from roadeval.errors import RoadevalError
 from roadeval.images.formats import ImageError, Limits, Size
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
@@ -109,7 +110,7 @@ def _parse(file: Path) -> Any:
             case _:
                 return content.decode()
     except OSError as error:
-        raise LogError(f"{file}: {error.strerror}") from error
+        raise LogError(error.strerror or str(error), where=file) from error
     except (ValueError, ParseError) as error:
         reason = str(error)
         if isinstance(error, ParseError):
@@ -117,7 +118,7 @@ def _parse(file: Path) -> Any:
             reason = f"it is no XML, or ends early (line {line}, column {column + 1})"
         elif isinstance(error, UnicodeDecodeError):
             reason = "it is not in UTF-8"
-        raise LogError(f"{file}: cannot be read as labels: {reason}") from error
+        raise LogError(f"cannot be read as labels: {reason}", where=file) from error
 
 
 def _read_drawn(
@@ -145,8 +146,8 @@ def _read_drawn(
     labelled = settle_shapes(labelled, roles, broken, notes)
     if not labelled:
         image, problem = next(iter(broken.items()), (files[0], f"{format_.name} without a shape"))
-        where = "" if str(files[0]) == str(image) else f"{files[0]}: "
-        raise LogError(f"{where}{image}: {problem}")
+        where = image if str(files[0]) == str(image) else f"{files[0]}: {image}"
+        raise LogError(problem, where=where)
     classes = {name: value for value, name in enumerate(occurring, 1)}
     labels = [_named_label(drawing, classes, format_) for drawing in labelled]
     labels += [
@@ -178,18 +179,18 @@ def _read_images(
                 except _UNREADABLE as error:
                     broken[drawing.image] = _in_words(error, format_)
         except _UNREADABLE as error:
-            damaged[file] = _in_words(error, format_).removeprefix(f"{file}: ")
+            damaged[file] = _in_words(error, format_)
     for file, problem in damaged.items():
         if file in image_counts or max(image_counts.values(), default=0) > 1:
-            raise LogError(f"{file}: {problem}")
+            raise LogError(problem, where=file)
         broken[str(file)] = problem
     return drawings, broken, others
 
 
 def _in_words(error: Exception, format_: LabelFormat) -> str:
     """Return the problem of a file, or of the label of an image."""
-    if not isinstance(error, _BAD_FORMAT) or isinstance(error, ImageError):
-        return str(error)
+    if isinstance(error, RoadevalError):
+        return error.reason
     lacking = f" (it has no {error})" if isinstance(error, KeyError) else ""
     return f"an annotation is not as {format_.name} writes it{lacking}"
 

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.files import first_names
+from roadeval.runtime.sentence import Sentence
 
 Mask = npt.NDArray[np.bool_]
 _CORNERS: Final = 90
@@ -310,11 +311,12 @@ def settle_shapes(
     without = [drawing.image for drawing in usable if roles.road.isdisjoint(drawing.classes)]
     if without and roles.road:
         counted = "left out" if roles.skip_roadless else "counted as images without road"
-        advice = "" if roles.skip_roadless else "; `truth.skip_roadless` leaves them out"
-        notes.append(
+        advice = Sentence("{truth.skip_roadless} leaves them out")
+        roadless = (
             f"{len(without)} of {len(drawings)} images have shapes, but none of road, and are "
-            f"{counted} ({first_names(without)}){advice}"
+            f"{counted} ({first_names(without)})"
         )
+        notes.append(roadless if roles.skip_roadless else Sentence("{}; {}", roadless, advice))
         # If no image has road, the class of road is named wrongly, which is reported later.
         if roles.skip_roadless and len(without) < len(usable):
             usable = [d for d in usable if not roles.road.isdisjoint(d.classes)]
@@ -350,8 +352,11 @@ def _find_hidden_shapes(drawings: Sequence[DrawnLabel], roles: ClassRoles) -> It
         images = f"{len(drawings)} images"
         if len(sample) < len(crossed):
             images = f"{len(sample)} images that were looked at"
-        yield (
-            f"road was drawn over {', '.join(name for name, _ in classes.most_common())} in "
-            f"{len(shares)} of {images}: {100 * np.mean(shares):.1f} % of the road's pixels "
-            "there, which count as road; draw road first, or name these classes in `labels.ignore`"
+        yield Sentence(
+            "road was drawn over {} in {} of {}: {} % of the road's pixels there, which count "
+            "as road; draw road first, or name these classes in {labels.ignore}",
+            ", ".join(name for name, _ in classes.most_common()),
+            len(shares),
+            images,
+            f"{100 * np.mean(shares):.1f}",
         )

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Rgb, Truth
 from roadeval.data.words import counted
 from roadeval.images.formats import Limits, Size
-from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.errors import BadMessage, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import (
@@ -47,6 +47,7 @@ from roadeval.logs.truth.pairing import (
     check_times,
     frames_of,
 )
+from roadeval.runtime.sentence import Sentence
 
 UNKNOWN: Final = 254
 """Stands for the truth of a value with unknown meaning."""
@@ -57,12 +58,12 @@ LEAST: Final = np.iinfo(np.int16).min
 NO_LABEL: Final = "values below 0 mean no label, and are ignored"
 _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 255: IGNORE})
 """The values of masks that need no settings, and their meaning."""
-TWO_KINDS: Final = (
-    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road with "
-    "`labels.road`, both where both do"
+TWO_KINDS: Final = Sentence(
+    "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road "
+    "with {labels.road}, both where both do"
 )
-NAME_THEM: Final = (
-    "name those that mean road with `labels.road`, and those to leave out with `labels.ignore`"
+NAME_THEM: Final = Sentence(
+    "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
 )
 RARE: Final = 0.05
 """A smaller share of the labelled pixels is hardly the road before a vehicle."""
@@ -135,7 +136,7 @@ class ClassMap:
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
         is_second = self.others == UNKNOWN and self.meaning.get(255) == IGNORE
         if is_second and (truth == IGNORE).any() and not (truth == ROAD).any():
-            raise BadMessage(f"it holds 255 but no 1: {TWO_KINDS}")
+            raise BadMessage("it holds 255 but no 1", remedy=TWO_KINDS)
         return truth
 
 
@@ -203,8 +204,8 @@ def count_values(
     values, counts = np.unique(packed, return_counts=True)
     if pixels.ndim != 2 and not labels.road_colors:
         raise LogError(
-            f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}: name those "
-            "that mean road with `labels.road_colors`"
+            f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}",
+            remedy=Sentence("name those that mean road with {labels.road_colors}"),
         )
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
@@ -223,8 +224,10 @@ def _is_blurred(colours: Rgb) -> bool:
     return bool(is_grey and is_white.any() and np.mean((levels > most) & ~is_white) <= RARE)
 
 
-def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name: str) -> ClassMap:
-    """Find the meaning of the values of label pictures.
+def understand(
+    labels: LabelSettings, pictures: Sequence[Collection[int]], name: str, shown: str = "road"
+) -> ClassMap:
+    """Find the meaning of the values of label pictures, which show road or ``shown``.
 
     ``pictures`` are the values, or packed colours, of each of some pictures. A `LogError` if a
     named value does not occur; or if none is named, and the values are class ids or have different
@@ -249,10 +252,11 @@ def understand(labels: LabelSettings, pictures: Sequence[Collection[int]], name:
                 remedy = TWO_KINDS
                 break
             ignored = [str(value) for value in values if truths.get(value) == IGNORE]
-            words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
+            words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored, shown)}"
             words += f"; {NO_LABEL}" if has_negatives else ""
             return ClassMap(truths, UNKNOWN, False, words)
-    raise LogError(f"{name} holds the values {_listed(map(str, values))}: {remedy}")
+    problem = f"{name} holds the values {_listed(map(str, values))}"
+    raise UnclearLabelsError(problem, remedy=remedy)
 
 
 def understand_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
@@ -265,7 +269,7 @@ def understand_classes(labels: LabelSettings, origin: LabelSet, name: str) -> Cl
     road = labels.road or (("road",) if {*classes} == {"road"} else ())
     there = _counted(origin, classes)
     if not road:
-        raise LogError(f"{name} has the classes {there}: {NAME_THEM}")
+        raise UnclearLabelsError(f"{name} has the classes {there}", remedy=NAME_THEM)
     if origin.lost:
         there += f"; {counted(origin.lost, 'label')} of it cannot be read"
     # The name of a class may be a number.
@@ -296,10 +300,11 @@ def _as_named(
         words.append([])
         for name in names:
             if name not in codes:
-                raise LogError(f"`labels.{setting}{ending}` {text(name)} does not occur in {there}")
+                problem = f"{text(name)} does not occur in {there}"
+                raise LogError(problem, setting=f"labels.{setting}{ending}")
             meaning[codes[name]] = truth
             words[-1].append(text(name))
-    return ClassMap(meaning, NON_ROAD, bool(ending), _words(*words))
+    return ClassMap(meaning, NON_ROAD, bool(ending), _words(words[0], words[1]))
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
@@ -323,9 +328,9 @@ def _color_name(packed: int) -> str:
     return f"{packed >> 16},{packed >> 8 & 255},{packed & 255}"
 
 
-def _words(road: Iterable[str], ignored: Iterable[str]) -> str:
+def _words(road: Iterable[str], ignored: Iterable[str], shown: str = "road") -> str:
     left_out = _listed(ignored)
-    return f"road is {_listed(road)}" + (f", {left_out} is ignored" if left_out else "")
+    return f"{shown} is {_listed(road)}" + (f", {left_out} is ignored" if left_out else "")
 
 
 def _listed(names: Iterable[str], limit: int = 16) -> str:
@@ -412,12 +417,14 @@ def source_beside_log(
         where, words = f"{labels.name} of {log}" if log else labels.name, by
         words = words if settings.pair else camera.clock
     else:
-        raise LogError("`truth.images` is for labels with names: those of a log have none")
+        problem = "only labels with names can be paired so, and those of a log have none"
+        raise LogError(problem, setting="truth.images")
     if by == "stamp":
         pairing = by_time(labels, camera, offset_ms)
         check_times(pairing, labels.name)
     elif offset_ms:
-        raise LogError(f"`topics.sync_offset_ms` is for stamps, and {where} is paired by {by}")
+        problem = f"only stamps can be moved, and {where} is paired by {by}"
+        raise LogError(problem, setting="topics.sync_offset_ms")
     else:
         pairing = by_number(labels, settings, camera.images)
     meaning = meaning_of(labels, settings, camera, pairing)
@@ -458,11 +465,12 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
         return ""
     sizes = f"{label} is {theirs[0]}x{theirs[1]}, {image} {ours[0]}x{ours[1]}"
     if is_turned:
-        return (
-            f"{sizes}: one of them is turned by a quarter: turn the labels as the images are "
-            "shown, or leave these as they are stored with `frames.unturned`"
+        return Sentence(
+            "{}: one of them is turned by a quarter: turn the labels as the images are shown, "
+            "or leave these as they are stored with {frames.unturned}",
+            sizes,
         )
-    return f"{sizes}: scale the labels with `topics.resize_truth`"
+    return Sentence("{}: scale the labels with {topics.resize_truth}", sizes)
 
 
 def check_size(
@@ -485,8 +493,8 @@ def undecodable(pictures: LabelPictures, problem: str) -> LogError:
     """Return the error that no picture can be decoded, with the reason of the first one."""
     if not problem:
         first = read_or_error(pictures, 0) if len(pictures) else "it holds no picture"
-        problem = str(first)
-    return LogError(f"nothing of {pictures.name} can be decoded: {problem}")
+        problem = first.sentence if isinstance(first, FrameError) else str(first)
+    return LogError(Sentence("nothing of {} can be decoded: {}", pictures.name, problem))
 
 
 def meaning_of(
@@ -494,10 +502,13 @@ def meaning_of(
     settings: MaskSettings,
     camera: Camera | None = None,
     pairing: Pairing | None = None,
+    *,
+    shown: str = "road",
 ) -> Meaning:
     """Find the meaning of labels by looking at some; check the size of labels beside the log, too.
 
-    A `LogError` if their values have no clear meaning.
+    The masks show road, or what ``shown`` names. A `LogError` if their values have no clear
+    meaning.
     """
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []
@@ -513,7 +524,7 @@ def meaning_of(
                 values = {int(confidence.codes(picture, labels.limits).max()): 1}
             counts.append(values)
         except BadMessage as error:
-            problem = problem or str(error)
+            problem = problem or error.sentence
     if not counts:
         raise undecodable(labels, problem)
     if confidence is not None:
@@ -522,7 +533,7 @@ def meaning_of(
     if origin.occurring:
         meaning = understand_classes(settings.labels, origin, labels.name)
     else:
-        meaning = understand(settings.labels, counts, labels.name)
+        meaning = understand(settings.labels, counts, labels.name, shown)
     pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()
     for value, count in pixels.items():
@@ -538,8 +549,10 @@ def meaning_of(
         f"({100 * count / pixels.total():.1f} %)"
         for value, count in pixels.most_common(8)
     )
-    doubt = (
-        f"road is {100 * road / labelled:.2f} % of the labelled pixels that were looked at, which "
-        f"are {shares}: does `labels.road` name the road?"
+    doubt = Sentence(
+        "road is {} % of the labelled pixels that were looked at, which are {}: does "
+        "{labels.road} name the road?",
+        f"{100 * road / labelled:.2f}",
+        shares,
     )
     return replace(meaning, notes=(doubt,))

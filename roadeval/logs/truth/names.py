@@ -33,6 +33,7 @@ from roadeval.logs.files import (
 )
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.settings import LabelPlace
+from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 
 SHORT: Final = 10
@@ -106,8 +107,8 @@ class NamedLabels:
         try:
             return label.picture(label.content(), self.limits)
         except (OSError, BadMessage, ImageError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error
-            raise FrameError(f"{self.place(position)}: {reason}") from error
+            reason = str(error.strerror) if isinstance(error, OSError) else error.sentence
+            raise FrameError(reason, where=self.place(position)) from error
 
     def place(self, position: int) -> str:
         """Return a label's path, for messages to people."""
@@ -137,20 +138,22 @@ def find_keys(
     shown = {label.path: shown_name(label.path, name) for label in origin.labels}
     names = {path: text for path, text in shown.items() if match_name(settings.names, text)}
     if not names:
-        theirs = first_names([*shown.values()])
-        raise LogError(f"{name}: no label has a name as `truth.names` {settings.names}: {theirs}")
+        problem = f"no label has a name as {settings.names}: {first_names([*shown.values()])}"
+        raise LogError(problem, where=name, setting="truth.names")
     images: list[Path] | None = None
     if settings.images is not None:
         folder = Path(settings.images)
         images, _ = order_by_time(list_files(folder, IMAGES))  # the order of `pack`
         if len({image.stem for image in images}) < len(images):
-            raise LogError(f"{folder}: two of its images have the same name")
+            raise LogError("two of its images have the same name", where=folder)
     by, keys = _keys_of(names, settings, images)
     if images is not None and not keys:
         raise LogError(
-            f"{name}: none of them has the name of an image in {settings.images}: theirs are "
-            f"{first_names([*names])}, the images' {first_names(images)}; without `truth.images` "
-            "numbers or stamps pair them"
+            f"no label has the name of an image in {settings.images}: theirs are "
+            f"{first_names([*names])}, the images' {first_names(images)}",
+            where=name,
+            setting="truth.images",
+            remedy="without it numbers or stamps pair them",
         )
     labels = [label for label in origin.labels if label.path in keys]
     labels.sort(key=lambda label: keys[label.path])
@@ -217,12 +220,17 @@ def _numbers_of(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
         odd_one = next((file for file, part in texts if part[::2] != parts[0][::2]), None)
         if others or odd_one:
             raise LogError(
-                f"{first_names(sorted({first, odd_one or last}))}: the names do not tell which "
-                f"digits are the frame's number: show them by `truth.names`, as frame_{NUMBER}_*; "
-                "or name the folder of the log's images by `truth.images`"
+                "the names do not tell which digits are the frame's number",
+                where=first_names(sorted({first, odd_one or last})),
+                remedy=Sentence(
+                    "show them by {truth.names}, as frame_{}_*; or name the folder of the log's "
+                    "images by {truth.images}",
+                    NUMBER,
+                ),
             )
     if not digits or max(map(len, digits)) > 18:  # more do not fit into 64 bits
-        raise LogError(f"{first}: its name has no number: pair by names, with `truth.images`")
+        remedy = Sentence("pair by names, with {truth.images}")
+        raise LogError("its name has no number", where=first, remedy=remedy)
     return dict(zip(files, map(int, digits), strict=True))
 
 
@@ -238,6 +246,8 @@ def _first_number(numbers: npt.NDArray[np.int64], frames: int | None, name: str)
     if frames is not None and (high == frames or len(numbers) == frames == high - low + 1):
         return high - frames + 1
     raise LogError(
-        f"{name}: its labels have the numbers {low} to {high}, which does not tell whether the "
-        "first frame is number 0 or 1: give `truth.first` 0 or `truth.first` 1"
+        f"its labels have the numbers {low} to {high}, which does not tell whether the first "
+        "frame is number 0 or 1",
+        where=name,
+        remedy=Sentence("set {truth.first} to 0 or to 1"),
     )

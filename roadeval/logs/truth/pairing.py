@@ -25,6 +25,7 @@ from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
 from roadeval.logs.truth.names import NamedLabels
+from roadeval.runtime.sentence import Sentence
 
 REACH: Final = 4
 """Messages to look at on either side, because topics are logged nearly in the order of stamps. If
@@ -418,10 +419,12 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
         # Labels come some moments after their images, so nearly a full second is one.
         seconds = round(apart / NS, 0 if abs(apart / NS - round(apart / NS)) < 0.2 else 3)
         side = "before" if seconds < 0 else "after"
+        remedy = "{topics.sync_offset_ms} {} moves the truth's to the images'"
         raise LogError(
-            f"{labels.name}: its stamps are of another clock than those of {images.name}: they lie "
-            f"about {abs(seconds):g} s {side} them for the same log times; `topics.sync_offset_ms` "
-            f"{round(-seconds * 1000)} moves the truth's to the images'"
+            f"its stamps are of another clock than those of {images.name}: they lie about "
+            f"{abs(seconds):g} s {side} them for the same log times",
+            where=labels.name,
+            remedy=Sentence(remedy, round(-seconds * 1000)),
         )
 
 
@@ -449,9 +452,10 @@ def _find_clock(
     stamped, away = (float(np.median(times)) / 1e6 for times in (behind, after))
     is_nearer = (stamped < 0, abs(stamped)) <= (away < 0, abs(away))
     if np.median(np.abs(after)) >= step and (is_nearer or (by_stamp == by_log).all()):
-        return Clock.STAMP, (
-            f"no name is the stamp of a frame: by median they lie {stamped:.1f} ms after the "
-            "nearest one; if they are of another one, `topics.sync_offset_ms` moves them"
+        return Clock.STAMP, Sentence(
+            "no name is the stamp of a frame: by median they lie {} ms after the nearest one; "
+            "if they are of another one, {topics.sync_offset_ms} moves them",
+            f"{stamped:.1f}",
         )
     met = int(np.count_nonzero(np.abs(after) <= tolerance_ns))
     return Clock.LOG_TIME, (
@@ -463,16 +467,22 @@ def _find_clock(
 def check_times(pairing: Pairing, name: str) -> None:
     """Raise a `LogError` if no label beside the log has the time of a frame."""
     if not len(pairing.labels):
-        raise LogError(f"{name}: the log has no times to pair by; set `truth.pair` to number")
+        remedy = Sentence("set {truth.pair} to number")
+        raise LogError("the log has no times to pair by", where=name, remedy=remedy)
     if next(frames_of(pairing), None) is None:
         theirs, ours = (
             f"{stamps.stamp(0)} to {stamps.stamp(len(stamps) - 1)}"
             for stamps in (pairing.labels, pairing.images)
         )
         raise LogError(
-            f"{name}: none of them belongs to a frame by {pairing.by}: theirs are {theirs} ns, the "
-            f"frames' {ours} ns; at most {pairing.tolerance / 1e6:g} ms may lie between "
-            "(`topics.sync_tolerance_ms`), or pair by number (`truth.pair`)"
+            f"none of them belongs to a frame by {pairing.by}: theirs are {theirs} ns, the frames' "
+            f"{ours} ns",
+            where=name,
+            remedy=Sentence(
+                "allow more than {} ms between them with {topics.sync_tolerance_ms}, or pair by "
+                "number with {truth.pair}",
+                f"{pairing.tolerance / 1e6:g}",
+            ),
         )
 
 
@@ -493,18 +503,24 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     in_folder, is_cut = labels.images, images.expected() != frames
     if in_folder is not None and (in_folder < frames or (in_folder > frames and not is_cut)):
         raise LogError(
-            f"{name}: {settings.images} holds {in_folder} images and the log {frames}, so it was "
-            "not made of all of them: leave `truth.images` out, and pair by number or stamp"
+            f"{settings.images} holds {in_folder} images and the log {frames}, so it was not made "
+            "of all of them",
+            where=name,
+            setting="truth.images",
+            remedy="leave it out, and pair by number or stamp",
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
         names = first_names([label.path for label in labels.labels])
         raise LogError(
-            f"{name}: none of them belongs to a frame by {labels.by}: theirs are "
-            f"{keys[0] + first} to {keys[-1] + first} ({names}), "
-            f"the frames' {first} to {first + frames - 1}: if {keys[0] + first} is the first "
-            "frame's, set `truth.first` to it; or name the folder of the images that the log was "
-            "made of with `truth.images`"
+            f"none of them belongs to a frame by {labels.by}: theirs are {keys[0] + first} to "
+            f"{keys[-1] + first} ({names}), the frames' {first} to {first + frames - 1}",
+            where=name,
+            remedy=Sentence(
+                "if {} is the first frame's, set {truth.first} to it; or name the folder of the "
+                "images that the log was made of with {truth.images}",
+                keys[0] + first,
+            ),
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
     unsure = frames - images.sure

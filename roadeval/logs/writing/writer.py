@@ -389,4 +389,4 @@ def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
     except OSError as error:
         raise LogError(f"{file}: {error.strerror}") from error
     except ImageError as error:
-        raise LogError(f"{file}: {error}") from error
+        raise LogError.of(error, file) from error

@@ -138,8 +138,8 @@ def scans(scene: Scene) -> Named:
     return {
         **{f"{name}_below": plane for name, plane in _column(scene, -1).items()},
         **{f"{name}_above": plane for name, plane in _column(scene, 1).items()},
-        "edge_inside": outwards(np.sqrt(steep)),
-        "hue_inside": outwards(mean(scene.hue, 3)),
+        "edge_inside": greatest_outwards(np.sqrt(steep)),
+        "hue_inside": greatest_outwards(mean(scene.hue, 3)),
     }
 
 
@@ -163,7 +163,7 @@ def _column(scene: Scene, step: int) -> Named:
     return {name: plane[::step] for name, plane in met.items()}
 
 
-def outwards(plane: Values) -> Values:
+def greatest_outwards(plane: Values) -> Values:
     """Return the greatest value met along a row from the image's middle to each pixel."""
     half = plane.shape[1] // 2
     greatest = np.empty_like(plane)
@@ -201,7 +201,7 @@ def barriers(scene: Scene) -> Named:
     return {
         **planes,
         **{f"over_{name}": distance(planes[name] * w, scene.patch) for name, w in BARRIERS.items()},
-        **{f"{name}_inside": outwards(plane) for name, plane in planes.items()},
+        **{f"{name}_inside": greatest_outwards(plane) for name, plane in planes.items()},
         "around_edge": scene.around_edge,
         "around_relative_edge": scene.around("relative_edge"),
     }
@@ -238,7 +238,7 @@ def _probabilities(opinion: Output) -> tuple[Probability, ...]:
     return opinion.by_class or (() if opinion.probability is None else (opinion.probability,))
 
 
-def opinions(opinion: Output, shape: tuple[int, int]) -> Values:
+def opinion_features(opinion: Output, shape: tuple[int, int]) -> Values:
     """Return the log-odds of road of each plane of an opinion, ``(P, h, w)`` float32.
 
     A mask without such planes gives the signed distance to its edge in pixels of the working image,
@@ -257,7 +257,7 @@ def opinions(opinion: Output, shape: tuple[int, int]) -> Values:
     return np.clip(inside - outside, -max(size), max(size))[None]
 
 
-def at_samples(
+def sample_features(
     sample: TrainingSet, see: Callable[[Rgb, Output | None], tuple[Scene, Values]]
 ) -> tuple[Values, Values]:
     """Return the features of the sampled pixels, and of the same pixels in the mirrored images.
@@ -301,7 +301,7 @@ LIGHT: Final = f"light.light_over_{SUNLIT}th_percentile"
 """Name of the feature that is the light of a pixel."""
 
 
-def lit(bright: Values) -> Values:
+def light_share(bright: Values) -> Values:
     """Return the share s of light, which grows from 0 at `SHADE` to 1 at `SUN`.
 
     ``bright`` is the feature `LIGHT`, float32 of any shape.
@@ -313,6 +313,6 @@ def beyond(far: Values, bright: Values) -> Values:
     """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, times its light.
 
     A shadow's edge lengthens the paths into it, so that in the shade the distance says little. All
-    are ``(h, w)`` float32; d is `reach`, s `lit`, ``bright`` the feature `LIGHT`.
+    are ``(h, w)`` float32; d is `reach`, s `light_share`, ``bright`` the feature `LIGHT`.
     """
-    return lit(bright) * np.maximum(far - 1, 0)
+    return light_share(bright) * np.maximum(far - 1, 0)

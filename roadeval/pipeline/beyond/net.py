@@ -26,7 +26,7 @@ def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
         try:
             output = network.road(view.image)
         except NetworkError as error:
-            raise StageError(f"net: {error}") from error
+            raise StageError.of(error, "net") from error
         assert output.mask is not None
         codes = output.probability
         levels = 255 * output.mask.pixels() if codes is None else (codes >> 8).astype(np.uint8)

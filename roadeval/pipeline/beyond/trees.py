@@ -32,13 +32,13 @@ from roadeval.pipeline.beyond.features import (
     GROUPS,
     LIGHT,
     SUNLIT,
-    at_samples,
     beyond,
     features,
     light_over,
-    lit,
+    light_share,
     names_of,
-    opinions,
+    opinion_features,
+    sample_features,
 )
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
@@ -282,8 +282,9 @@ def see(settings: TreesSettings, image: Rgb, opinion: Output | None = None) -> t
     if not settings.opinion:
         return scene, planes
     if opinion is None:
-        raise StageError("trees: `opinion` asks for a stage before it that makes a road mask")
-    return scene, np.concatenate([planes, opinions(opinion, scene.shape)])
+        problem = "asks for a stage before it that makes a road mask"
+        raise StageError(problem, setting="trees.opinion")
+    return scene, np.concatenate([planes, opinion_features(opinion, scene.shape)])
 
 
 def fit(sample: TrainingSet, settings: TreesSettings, base: Blend | None = None) -> Blend:
@@ -293,7 +294,7 @@ def fit(sample: TrainingSet, settings: TreesSettings, base: Blend | None = None)
     classes get the weights that they have in the frames. The output of ``base`` is one more
     feature.
     """
-    values = np.concatenate(at_samples(sample, partial(see, settings)))
+    values = np.concatenate(sample_features(sample, partial(see, settings)))
     if base is not None:
         by_feature = np.ascontiguousarray(values.T)
         odds = base.log_odds(by_feature, network_weight(by_feature, settings))
@@ -340,7 +341,7 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     names = names_of(settings.features)
     if LIGHT not in names:
         return IN_LIGHT
-    return IN_SHADE + (IN_LIGHT - IN_SHADE) * lit(values[names.index(LIGHT)])
+    return IN_SHADE + (IN_LIGHT - IN_SHADE) * light_share(values[names.index(LIGHT)])
 
 
 def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:

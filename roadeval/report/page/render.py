@@ -217,6 +217,6 @@ def _name(text: str, taken: set[str]) -> str:
 
 def write_page(path: Path, document: Report) -> Path:
     """Write a document as a page; a `ReportError` if it cannot be written."""
-    with writing(path, ReportError, "; choose another place"):
+    with writing(path, partial(ReportError, remedy="choose another place")):
         put(path, page(document))
     return path

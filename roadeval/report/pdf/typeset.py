@@ -13,6 +13,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Mapping
+from functools import partial
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -106,6 +107,6 @@ def write_file(path: Path, content: bytes) -> Path:
 
     A `ReportError` if it cannot be written.
     """
-    with writing(path, ReportError, "; choose another place"):
+    with writing(path, partial(ReportError, remedy="choose another place")):
         put(path, content)
     return path

@@ -21,7 +21,7 @@ from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, is_significant, marked_interval
 from roadeval.results.verdict import focus_of
-from roadeval.runtime.text import elided
+from roadeval.runtime.text import elide
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -227,7 +227,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     yield Heading(f"The worst frames of {focus} over all drives")
     pictures = []
     for row in rows:
-        title = f"{elided(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
+        title = f"{elide(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
         if content := findings.picture(row):
             error = f"ERR {percent(row[TESTED], 1)} %"
             pictures.append((f"{row['rank']}. {title}: {error}", ImageFile(content)))

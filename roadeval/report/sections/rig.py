@@ -26,7 +26,7 @@ def each_camera(findings: Findings) -> Iterator[Block]:
         topic = camera if names[camera] != camera.strip("/") else ""
         size = f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
         yield Text(", ".join(filter(None, (topic, size))), "note")
-        yield Text(facts.verdict.replace("`", ""))
+        yield Text(facts.verdict)
         if of_camera.totals:
             yield Details("Rates of every final mask", [rates_table(facts)])
         for frame in of_camera.worst[:1]:

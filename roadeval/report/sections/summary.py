@@ -49,7 +49,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
 def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [caption("partial")], "warning")
-    yield Text(findings.facts.verdict.replace("`", ""), "verdict")
+    yield Text(findings.facts.verdict, "verdict")
     for frame in findings.worst[:1]:
         title = f"First frame to look at: {frame.frame}"
         if frame.rates:
@@ -71,7 +71,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
 
 def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     facts = findings.facts
-    yield Text(facts.verdict.replace("`", ""), "verdict")
+    yield Text(facts.verdict, "verdict")
     for frame in records(findings.worst[:1]):
         where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
         title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"

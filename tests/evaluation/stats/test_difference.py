@@ -1,4 +1,4 @@
-"""Differences between masks within a drive and over drives, and corrections of their p-values."""
+"""Differences between masks, corrections of p-values, and means of series that remember."""
 
 import math
 from itertools import combinations, product

@@ -6,7 +6,7 @@ import tomlkit
 
 from roadeval.config.run import config_toml, configure, load_config, run_toml
 from roadeval.config.variants import PRESETS
-from tests.config.test_toml import OTHER, tables
+from tests.config.test_config import OTHER, tables
 from tests.fuzz.harness import Harness, scratch
 
 

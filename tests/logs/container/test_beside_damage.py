@@ -1,4 +1,4 @@
-"""Chunks that are intact are read, whatever is damaged beside them, and nothing unverified is."""
+"""Chunks that are intact are read, whatever is damaged beside them; what earlier ones misread."""
 
 import zlib
 from collections.abc import Callable
@@ -19,8 +19,8 @@ from tests.fuzz.intact import FRAMES, Intact, Reading, intact_logs, read
 from tests.logs.making import chunk_record
 
 START, SIZE, DATA_SIZE, NAME = 9, 25, 41, 37
-"""Where a chunk's head has its start time, the size of its records, and, behind a name of no
-letters, that of its data; and the length of that name."""
+"""Offsets in a chunk: its start time, the size of its records, the size of its data if its name is
+empty, and the length of the name."""
 
 Damage = Callable[[Intact], bytes]
 
@@ -100,7 +100,7 @@ def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[i
 
 
 @pytest.mark.parametrize(
-    ("kind", "damage", "told"),
+    ("kind", "damage", "reason"),
     [
         ("zstd", data_size, ""),
         ("lz4", data_size, ""),
@@ -116,12 +116,12 @@ def beside(log: Intact, tmp_path: Path, damage: Damage) -> tuple[Reading, list[i
         ("uncompressed", number_of_labels_in_the_summary, ""),
     ],
 )
-def test_every_frame_is_read(tmp_path, kind, damage, told):
+def test_every_frame_is_read(tmp_path, kind, damage, reason):
     reading, other = beside(intact_logs()[kind], tmp_path, damage)
     assert len(reading.frames) == FRAMES, reading.told
     assert not other
-    assert told in " | ".join(reading.told)
-    assert bool(told) or not reading.told
+    assert reason in " | ".join(reading.told)
+    assert bool(reason) or not reading.told
 
 
 @pytest.mark.parametrize("by", [-1, 1, 64])

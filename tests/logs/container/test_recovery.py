@@ -1,4 +1,4 @@
-"""What is saved of damaged and odd logs, and what is said about the rest."""
+"""The frames that are saved from damaged and odd logs, and the sentences about the rest."""
 
 import os
 import re
@@ -73,7 +73,7 @@ SHARED_AT = {
     "trunc_unchunked": 2462562,
     "zero_hole": 66147,
 }
-"""Where the shared ones are damaged."""
+"""The bytes at which the shared logs are damaged."""
 SHARED_WITH_IMAGES = {
     "lichtblick_custom_camera.json_CompressedImage": 10,
     "mcap_explorer_demo.protobuf_CompressedImage": 30,
@@ -115,22 +115,22 @@ def test_the_tables_name_every_file(folder: Path | None) -> None:
 
 @broken(BROKEN)
 def test_a_log_that_lacks_nothing_loses_nothing(log: Path) -> None:
-    good, in_log, said = BROKEN[log.stem]
+    good, in_log, reason = BROKEN[log.stem]
     with open_log(log) as opened:
         opened.verify()
         assert decoded(opened) == (good, in_log)
         assert opened.losses == ()
         sentences = " | ".join(map(str, opened.damage))
-    assert bool(sentences) == bool(said)
-    assert matches(said, sentences, log)
+    assert bool(sentences) == bool(reason)
+    assert matches(reason, sentences, log)
 
 
 @broken(LOSSY)
 def test_a_damaged_log_gives_what_is_readable_and_says_the_rest(log: Path) -> None:
-    good, in_log, said = LOSSY[log.stem]
+    good, in_log, reason = LOSSY[log.stem]
     with open_log(log) as opened:
         assert decoded(opened) == (good, in_log)
-        assert matches(said, " | ".join(opened.losses), log)
+        assert matches(reason, " | ".join(opened.losses), log)
 
 
 @broken(["chunk_crc_field_bad"])
@@ -214,7 +214,7 @@ def test_a_folder_of_split_files_is_one_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("there", "told"),
+    ("there", "missing_numbers"),
     [
         ([0, 1, 3], [2]),
         ([0, 3], [1, 2]),
@@ -228,30 +228,32 @@ def test_a_folder_of_split_files_is_one_log(tmp_path: Path) -> None:
     [("run_{}.mcap", "run_{}.mcap"), ("{0}_run_2026_03_01-10_00_{0:02}.mcap", "{}_run_*.mcap")],
 )
 def test_a_file_that_lacks_is_told_by_old_names_of_rosbag2_and_by_new(
-    tmp_path: Path, name: str, lacking: str, there: list[int], told: list[int]
+    tmp_path: Path, name: str, lacking: str, there: list[int], missing_numbers: list[int]
 ) -> None:
     """Names of splits since rosbag2 0.33.1: ``{n}_{name}_{date}.mcap``, n not padded."""
     for number in there:
         (tmp_path / name.format(number)).write_bytes(LOGS["broken/ok.mcap"].data())
     with open_log(tmp_path) as log:
         missing = [loss for loss in log.losses if "missing" in loss]
-    assert missing == [f"{lacking.format(number)}: the file is missing (byte 0)" for number in told]
+    assert missing == [
+        f"{lacking.format(number)}: the file is missing (byte 0)" for number in missing_numbers
+    ]
 
 
 @pytest.mark.parametrize(
     "change",
     [
-        lambda path, whole: path.write_bytes(whole[:5000] + bytes(8) + whole[5008:]),
-        lambda path, whole: path.write_bytes(whole[: len(whole) // 2]),
-        lambda path, whole: path.write_bytes(whole + whole),
+        lambda path, content: path.write_bytes(content[:5000] + bytes(8) + content[5008:]),
+        lambda path, content: path.write_bytes(content[: len(content) // 2]),
+        lambda path, content: path.write_bytes(content + content),
     ],
     ids=["other bytes", "cut off", "longer"],
 )
 def test_a_log_that_is_written_anew_while_it_is_read_is_refused(tmp_path: Path, change) -> None:
     path = make("broken/ok.mcap", tmp_path)
-    whole = path.read_bytes()
+    content = path.read_bytes()
     with open_log(path) as log:
-        change(path, whole)
+        change(path, content)
         os.utime(path, ns=(1, 1))  # a coarse clock would hide it
         with pytest.raises(LogError, match=r"it changed while it was read; run again$"):
             assert log.losses
@@ -259,15 +261,15 @@ def test_a_log_that_is_written_anew_while_it_is_read_is_refused(tmp_path: Path, 
 
 def test_a_log_that_grows_or_is_replaced_while_it_is_read_is_as_it_was(tmp_path: Path) -> None:
     path = make("broken/ok.mcap", tmp_path)
-    whole, new = path.read_bytes(), tmp_path / "new.mcap"
+    content, new = path.read_bytes(), tmp_path / "new.mcap"
     with open_log(path) as log:
-        new.write_bytes(whole[:100])
+        new.write_bytes(content[:100])
         new.replace(path)
         assert log.losses == ()
-    path.write_bytes(whole[: len(whole) // 2])
+    path.write_bytes(content[: len(content) // 2])
     with open_log(path) as log:
         before = log.losses
-        path.write_bytes(whole)
+        path.write_bytes(content)
         assert log.losses == before
 
 
@@ -293,7 +295,7 @@ rosbag2_bagfile_information:
 
 
 @pytest.mark.parametrize(
-    ("listed", "there", "told"),
+    ("listed", "there", "missing_names"),
     [
         ("a_0.mcap a_1.mcap", "a_0.mcap a_1.mcap", ""),
         ("a_0.mcap a_1.mcap a_2.mcap", "a_0.mcap", "a_1.mcap a_2.mcap"),
@@ -305,7 +307,9 @@ rosbag2_bagfile_information:
         ("a_0.mcap a_1.mcap", "renamed.mcap", ""),
     ],
 )
-def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(tmp_path, listed, there, told):
+def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(
+    tmp_path, listed, there, missing_names
+):
     for name in there.split():
         (tmp_path / name).write_bytes(LOGS["broken/ok.mcap"].data())
     for end in ("\n", "\r\n"):
@@ -313,7 +317,9 @@ def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(tmp_path, listed, t
         (tmp_path / "metadata.yaml").write_bytes(note.encode())
         with open_log(tmp_path) as log:
             missing = [loss for loss in log.losses if "images kept" not in loss]
-            assert missing == [f"{name}: the file is missing (byte 0)" for name in told.split()]
+            assert missing == [
+                f"{name}: the file is missing (byte 0)" for name in missing_names.split()
+            ]
 
 
 @pytest.mark.parametrize(

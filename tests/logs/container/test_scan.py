@@ -1,16 +1,20 @@
-"""The walk from record to record, over what is damaged."""
+"""The walk from record to record, over what is damaged, and over whatever MCAP leaves open."""
 
+import json
 import struct
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import pytest
 import zstandard
 from mcap.opcode import Opcode
 
+from roadeval.logs.container.file import containers_in, damage_of
+from roadeval.logs.container.records import Message
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LogConfig, TopicSettings
-from tests.fixtures import broken
+from tests.fixtures import broken, conformance
 from tests.fixtures.broken import (
     HEAD,
     LENGTH_AT,
@@ -21,12 +25,13 @@ from tests.fixtures.broken import (
     mended,
     over,
 )
+from tests.fixtures.shared import shared
 from tests.logs.making import CAMERA, FRAMES, START, chunk_record, small_log
 
 FOOTER = HEAD + 20 + 8
 
 
-def kept(path: Path) -> list[int]:
+def kept_images(path: Path) -> list[int]:
     """Positions in the good log of the images that are kept whole."""
     with open_log(path, LogConfig(topics=TopicSettings(image=CAMERA, truth=""))) as log:
         frames = [frame.decode() for frame in log.frames(log.select())]
@@ -63,8 +68,8 @@ def test_an_image_of_wrong_length_costs_only_itself(unchunked: Path, longer: int
     data = unchunked.read_bytes()
     at = records(data, Opcode.MESSAGE)[6]
     length = length_of(data, at) - HEAD + longer
-    found = kept(changed(unchunked, at + LENGTH_AT, length.to_bytes(8, "little")))
-    assert set(range(FRAMES)) - set(found) <= {3}
+    images = kept_images(changed(unchunked, at + LENGTH_AT, length.to_bytes(8, "little")))
+    assert set(range(FRAMES)) - set(images) <= {3}
 
 
 def test_a_wrong_message_index_costs_nothing_and_no_order(chunked: Path) -> None:
@@ -74,7 +79,7 @@ def test_a_wrong_message_index_costs_nothing_and_no_order(chunked: Path) -> None
     assert good[channel] == 1, "the second chunk's index of the camera"
     for byte in range(entries, entries + 3 * 16):
         chunked.write_bytes(good)
-        assert kept(changed(chunked, byte, bytes([good[byte] ^ 4]))) == [*range(FRAMES)]
+        assert kept_images(changed(chunked, byte, bytes([good[byte] ^ 4]))) == [*range(FRAMES)]
 
 
 def test_a_wrong_message_index_is_noted(chunked: Path) -> None:
@@ -89,7 +94,7 @@ def test_a_wrong_message_index_is_noted(chunked: Path) -> None:
 @pytest.mark.parametrize("offset", range(8))
 def test_a_wrong_byte_at_the_very_beginning_is_forgiven(chunked: Path, offset: int) -> None:
     changed(chunked, offset, b"?")
-    assert kept(chunked) == [*range(FRAMES)]
+    assert kept_images(chunked) == [*range(FRAMES)]
     with open_log(chunked) as log:
         assert log.losses == ()
         assert "does not begin as it should" in str(log.damage[0])
@@ -105,7 +110,7 @@ def test_a_missing_record_at_the_end_of_the_data_is_no_loss(tmp_path: Path, cont
     # Writers that leave this record out give no checksums, and no offsets of summary sections.
     footer = over(data[-FOOTER:], HEAD, start.to_bytes(8, "little") + bytes(12))
     path.write_bytes(data[:at] + data[at + length_of(data, at) : -FOOTER] + footer)
-    assert kept(path) == [*range(FRAMES)]
+    assert kept_images(path) == [*range(FRAMES)]
     with open_log(path) as log:
         log.verify()
         assert log.losses == ()
@@ -116,7 +121,7 @@ def test_a_footer_that_points_into_the_data_ends_nothing(unchunked: Path) -> Non
     data = unchunked.read_bytes()
     start = records(data, Opcode.MESSAGE)[6].to_bytes(8, "little")
     path = changed(unchunked, len(data) - FOOTER + HEAD, start + bytes(12))
-    assert kept(path) == [*range(FRAMES)]
+    assert kept_images(path) == [*range(FRAMES)]
 
 
 SIZE = 9 * (2 << 20)
@@ -129,14 +134,14 @@ COMPRESSED_ZEROS = {
 
 @pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
 @pytest.mark.parametrize(
-    ("largest", "told"),
+    ("largest", "loss"),
     [
         (1 << 30, "a chunk whose records do not add up"),
         (10 << 20, "a chunk of more than 10485760 bytes"),
     ],
 )
 def test_zeros_in_place_of_records_are_told_and_given_up_if_they_grow_beyond_all_bounds(
-    tmp_path, monkeypatch, compression, largest, told
+    tmp_path, monkeypatch, compression, largest, loss
 ):
     """They lie in front of all other chunks, in a log without a summary."""
     monkeypatch.setattr("roadeval.logs.container.records.LARGEST_CHUNK", largest)
@@ -148,33 +153,33 @@ def test_zeros_in_place_of_records_are_told_and_given_up_if_they_grow_beyond_all
     chunk = chunk_record(COMPRESSED_ZEROS[compression], compression, SIZE, start=START)
     tail = b"\x0f" + struct.pack("<QI", 4, 0) + b"\x02" + struct.pack("<Q", 20) + bytes(20)
     path.write_bytes(log[:begin] + chunk + log[begin:end] + tail + log[:8])
-    assert kept(path) == [*range(FRAMES)]
+    assert kept_images(path) == [*range(FRAMES)]
     with open_log(path) as opened:
-        assert told in opened.losses[0]
+        assert loss in opened.losses[0]
 
 
 def test_two_descriptions_of_a_topic_outside_chunks_are_told(unchunked: Path) -> None:
     """Which is right nothing tells: the summary has a checksum, the data was what messages met."""
-    whole = unchunked.read_bytes()
+    content = unchunked.read_bytes()
     name = b"sensor_msgs/msg/CompressedImage"
-    last = whole.rindex(name)
-    wrong = whole[:last] + name.replace(b"sensor", b"tensor") + whole[last + len(name) :]
+    last = content.rindex(name)
+    wrong = content[:last] + name.replace(b"sensor", b"tensor") + content[last + len(name) :]
     unchunked.write_bytes(mended(wrong))
     with open_log(unchunked) as log:
-        told, *_ = log.losses
-    assert "a topic is described here in another way" in told
+        loss, *_ = log.losses
+    assert "a topic is described here in another way" in loss
 
 
 def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
     """The summary's copy of a definition may say something else under a checksum that is right."""
-    whole = chunked.read_bytes()
-    wrong = whole.replace(b"string format\nuint8[] data", b"string format\nuint8[] dota")
-    assert wrong != whole
+    content = chunked.read_bytes()
+    wrong = content.replace(b"string format\nuint8[] data", b"string format\nuint8[] dota")
+    assert wrong != content
     chunked.write_bytes(mended(wrong))
-    assert kept(chunked) == list(range(FRAMES))
+    assert kept_images(chunked) == list(range(FRAMES))
     with open_log(chunked) as log:
-        told, *_ = log.losses
-    assert "described here in another way than before" in told
+        loss, *_ = log.losses
+    assert "described here in another way than before" in loss
 
 
 def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchunked: Path) -> None:
@@ -182,7 +187,7 @@ def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchun
     at = records(data, Opcode.MESSAGE)[6]
     short = b"\x05" + (10).to_bytes(8, "little") + data[at + 9 : at + 19]
     unchunked.write_bytes(data[:at] + short + data[at:])
-    assert kept(unchunked) == [*range(FRAMES)]
+    assert kept_images(unchunked) == [*range(FRAMES)]
     with open_log(unchunked) as log:
         assert "of a length that cannot be" in log.losses[0]
 
@@ -190,18 +195,18 @@ def test_a_message_without_room_for_its_head_is_damage_and_costs_no_image(unchun
 @pytest.mark.parametrize("opcode", [0, 4, 5, 9, 0x0F, 0x87])
 def test_a_message_index_under_another_kind_costs_nothing(chunked: Path, opcode: int) -> None:
     at = records(chunked.read_bytes(), Opcode.MESSAGE_INDEX)[3]
-    assert kept(changed(chunked, at, bytes([opcode]))) == [*range(FRAMES)]
+    assert kept_images(changed(chunked, at, bytes([opcode]))) == [*range(FRAMES)]
 
 
 def test_a_chunk_that_calls_itself_an_attachment_is_read_without_any_summary(chunked: Path) -> None:
     data = chunked.read_bytes()
     chunked.write_bytes(data[: data_end(data)])
     at = records(data, Opcode.CHUNK)[1]
-    assert kept(changed(chunked, at, b"\x09")) == [*range(FRAMES)]
+    assert kept_images(changed(chunked, at, b"\x09")) == [*range(FRAMES)]
 
 
 CHUNK_LENGTH_AT = HEAD + 8 + 8 + 8
-"""Where a chunk index has the length of its chunk."""
+"""The offset of the chunk's length in a chunk index."""
 
 
 def without(number: int, data: bytes) -> bytes:
@@ -258,9 +263,78 @@ def of_wrong_records() -> tuple[bytes, str]:
     "damage", [left_out, repeated, without_an_end, without_a_summary, of_wrong_records]
 )
 def test_a_chunk_that_is_missing_repeated_or_wrong_is_told(tmp_path, damage):
-    data, told = damage()
+    data, reason = damage()
     path = tmp_path / "drive.mcap"
     path.write_bytes(data)
     with open_log(path) as log:
         log.verify()
-        assert told in " | ".join(log.losses)
+        assert reason in " | ".join(log.losses)
+
+
+FOLDERS = "NoData OneAttachment OneMessage OneMetadata OneSchemalessMessage TenMessages"
+
+
+def plain(value: Any) -> Any:
+    """A value as the suite's JSON writes it: numbers and bytes as strings."""
+    if isinstance(value, bytes | memoryview):
+        return [str(byte) for byte in value]
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    return value if isinstance(value, str) else str(value)
+
+
+def fields(record: Any) -> dict[str, Any]:
+    named = record._asdict() if isinstance(record, Message) else vars(record)
+    return {key: plain(value) for key, value in named.items()}
+
+
+Suite = list[tuple[Path, list[tuple[str, dict[str, Any]]]]]
+"""Logs, and the records expected of each, by kind and fields."""
+
+
+def here(content: str, folder: Path) -> Suite:
+    """Write every variant of a content, and read its records by the MCAP project's reader."""
+    suite = []
+    for name, data in conformance.variants(content):
+        path = folder / f"{name}.mcap"
+        path.write_bytes(data)
+        found_records = [
+            (type(record).__name__, fields(record)) for record in conformance.records(data)
+        ]
+        suite.append((path, [record for record in found_records if record[0] != "MessageIndex"]))
+    return suite
+
+
+def published(folder: Path) -> Suite:
+    """Return the MCAP project's suite, and what it says itself."""
+    suite = []
+    for path in sorted(folder.glob("*.mcap")):
+        listed = json.loads(path.with_suffix(".json").read_text())["records"]
+        suite.append((path, [(record["type"], dict(record["fields"])) for record in listed]))
+    return suite
+
+
+@pytest.fixture(params=[*conformance.CONTENTS, *shared("mcap", "conformance")], ids=str)
+def suite(request: pytest.FixtureRequest, tmp_path: Path) -> Suite:
+    if isinstance(request.param, str):
+        return here(request.param, tmp_path)
+    return [case for folder in FOLDERS.split() for case in published(request.param / folder)]
+
+
+def test_every_message_topic_and_schema_is_found_and_nothing_is_called_damaged(suite: Suite):
+    assert suite
+    for path, expected in suite:
+        (container,) = containers_in(path, lambda *_: True, lambda *_: 0)
+        found_records = [
+            ("Message", fields(container.message(chunk, offset)))
+            for log in container.logs.values()
+            for chunk, entries in log.blocks
+            for _, offset in entries.tolist()
+        ]
+        assert damage_of(container) == (), path.name
+        container.close()
+        assert found_records == [record for record in expected if record[0] == "Message"], path.name
+        for kind, described in (("Channel", container.channels), ("Schema", container.schemas)):
+            records = {number: (kind, fields(record)) for number, record in described.items()}
+            listed = {int(record[1]["id"]): record for record in expected if record[0] == kind}
+            assert records == listed, path.name

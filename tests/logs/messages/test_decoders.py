@@ -1,4 +1,4 @@
-"""Messages in every encoding, to the picture they carry."""
+"""Messages in every encoding: pictures and their pixels, calibrations and transforms."""
 
 import json
 import re
@@ -79,8 +79,8 @@ def test_json_is_read_with_every_form_of_a_stamp(fields: dict[str, Any]) -> None
     message = fields | {"format": "jpeg", "data": "ZmlsZQ=="}
     picture = read("json", None, json.dumps(message).encode())
     assert isinstance(picture, CompressedPicture)
-    found = picture.stamp_ns, picture.format, bytes(picture.data)
-    assert found == (5_000_000_006, "jpeg", b"file")
+    decoded = picture.stamp_ns, picture.format, bytes(picture.data)
+    assert decoded == (5_000_000_006, "jpeg", b"file")
 
 
 @pytest.mark.parametrize(
@@ -107,12 +107,12 @@ def test_what_cannot_be_read_is_refused(encoding, described, data):
 
 
 @pytest.mark.parametrize(
-    ("data", "whole"), [(PACKED, True), (PACKED[:-1], False), (PACKED + b"more", False)]
+    ("data", "is_whole"), [(PACKED, True), (PACKED[:-1], False), (PACKED + b"more", False)]
 )
-def test_a_message_is_as_long_as_its_fields_say(data: bytes, whole: bool) -> None:
+def test_a_message_is_as_long_as_its_fields_say(data: bytes, is_whole: bool) -> None:
     message = Message(1, 0, 0, 0, memoryview(data))
     described = schema(NAME, "ros2msg", COMPRESSED)
-    assert (message_stamp(channel("cdr"), described, message) is not None) is whole
+    assert (message_stamp(channel("cdr"), described, message) is not None) is is_whole
 
 
 D, K = [-0.1, 0.01, 0.0, 0.0, 0.5], [80.0, 0, 48, 0, 81, 36, 0, 0, 1]

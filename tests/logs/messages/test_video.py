@@ -33,14 +33,14 @@ def test_its_size_is_known_before_the_first_frame(log: Path) -> None:
 
 @pytest.mark.parametrize("log", VIDEOS, indirect=True)
 def test_a_start_amid_the_video_begins_at_the_keyframe_before(log, monkeypatch):
-    whole = frames(log)
+    all_frames = frames(log)
     monkeypatch.setattr("roadeval.logs.messages.pictures.PATIENCE", 2)
     with open_log(log) as opened:
         stream = opened.frames(opened.select())
         start = [frame.log_time_ns for frame in stream][7]
     late = frames(log, start=f"{start}ns")
     assert [frame.number for frame in late] == [7, 8, 9, 10, 11]
-    assert np.array_equal(late[0].image, whole[7].image)
+    assert np.array_equal(late[0].image, all_frames[7].image)
 
 
 class Packets(list[CompressedPicture]):
@@ -58,18 +58,18 @@ def packets_of(path: Path, *lost: int) -> Packets:
     """Return the packets of a log, some of them lost."""
     with open_log(path) as log:
         stream = log.frames(log.select())
-        found = Packets(CompressedPicture(f.stamp_ns, "h264", f.decode().payload) for f in stream)
-    found.lost = lost
-    return found
+        packets = Packets(CompressedPicture(f.stamp_ns, "h264", f.decode().payload) for f in stream)
+    packets.lost = lost
+    return packets
 
 
 def readable(packets: Packets) -> list[int]:
-    video, found = Video(packets, Limits()), []
+    video, positions = Video(packets, Limits()), []
     for position in range(len(packets)):
         with suppress(FrameError):
             video.picture(position)
-            found.append(position)
-    return found
+            positions.append(position)
+    return positions
 
 
 @of_h264
@@ -104,8 +104,8 @@ def test_what_builds_upon_a_packet_that_is_missing_is_lost(codec, counted, lost)
     keys = (n for n in range(lost + 1, VIDEO_FRAMES) if is_keyframe(left[n]))
     resumed = next(keys, VIDEO_FRAMES)
     del left[lost]
-    found = [left[position].stamp_ns for position in readable(left)]
-    assert found == [*range(lost), *range(resumed, VIDEO_FRAMES)]
+    stamps = [left[position].stamp_ns for position in readable(left)]
+    assert stamps == [*range(lost), *range(resumed, VIDEO_FRAMES)]
 
 
 CODECS = [f"made:flavours/fox_pb_CompressedVideo_{codec}.mcap" for codec in ENCODERS]
@@ -113,17 +113,17 @@ CODECS = [f"made:flavours/fox_pb_CompressedVideo_{codec}.mcap" for codec in ENCO
 
 @pytest.mark.parametrize("log", CODECS, indirect=True)
 def test_every_codec_is_decoded_from_any_frame(log: Path) -> None:
-    found = frames(log)
-    late = frames(log, start=f"{found[6].log_time_ns}ns")
-    assert [frame.number for frame in found] == list(range(VIDEO_FRAMES))
-    assert all(np.abs(f.image.astype(int) - bar(f.number)).mean() < 5 for f in found)
-    assert all(np.array_equal(a.image, b.image) for a, b in zip(late, found[6:], strict=True))
+    all_frames = frames(log)
+    late = frames(log, start=f"{all_frames[6].log_time_ns}ns")
+    assert [frame.number for frame in all_frames] == list(range(VIDEO_FRAMES))
+    assert all(np.abs(f.image.astype(int) - bar(f.number)).mean() < 5 for f in all_frames)
+    assert all(np.array_equal(a.image, b.image) for a, b in zip(late, all_frames[6:], strict=True))
 
 
 @of_h264
 def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(log: Path) -> None:
-    whole = bytes(packets_of(log)[0].data)
-    parameters = whole[: whole.index(b"\x00\x00\x01\x65")]
+    keyframe = bytes(packets_of(log)[0].data)
+    parameters = keyframe[: keyframe.index(b"\x00\x00\x01\x65")]
     assert is_keyframe(CompressedPicture(0, "h264", parameters))
     assert not is_keyframe(CompressedPicture(0, "h264", b"no video"))
 
@@ -167,13 +167,13 @@ def encoded(pictures: list[np.ndarray], bf: int) -> list[tuple[int, bytes]]:
     encoder.pix_fmt, encoder.framerate, encoder.time_base = "yuv420p", 10, Fraction(1, 10)
     encoder.max_b_frames = bf
     encoder.options = {"x264-params": "qp=1:scenecut=0:b-adapt=0"}
-    found = []
+    packets = []
     for number, luma in enumerate(pictures):
         grey = np.full((luma.shape[0] // 2, luma.shape[1]), 128, np.uint8)
         frame = av.VideoFrame.from_ndarray(np.concatenate([luma, grey]), "yuv420p")
         frame.pts = number
-        found += encoder.encode(frame)
-    return [(int(packet.pts), bytes(packet)) for packet in (*found, *encoder.encode(None))]
+        packets += encoder.encode(frame)
+    return [(int(packet.pts), bytes(packet)) for packet in (*packets, *encoder.encode(None))]
 
 
 def stamped(video: list[tuple[int, bytes]], *, by_place: bool = True) -> Packets:
@@ -185,22 +185,22 @@ def stamped(video: list[tuple[int, bytes]], *, by_place: bool = True) -> Packets
 
 
 @pytest.mark.parametrize(
-    ("bf", "by_place", "told"),
+    ("bf", "by_place", "note"),
     [
         (0, True, None),
         (2, True, "the video has B-frames: frames are numbered in the order of decoding"),
         (2, False, "the video has B-frames, and stamps in the order of decoding"),
     ],
 )
-def test_b_frames_are_told(bf: int, by_place: bool, told: str | None) -> None:
+def test_b_frames_are_told(bf: int, by_place: bool, note: str | None) -> None:
     slope = np.arange(64, dtype=np.uint8) + 60
     pictures = [np.roll(slope, 5 * i)[None].repeat(48, 0) for i in range(9)]
     packets = stamped(encoded(pictures, bf), by_place=by_place)
     video = Video(packets, Limits())
     for position in range(len(packets)):
         video.picture(position)
-    assert video.notes.get("order", "")[: len(told or "")] == (told or "")
-    assert bool(video.notes) == bool(told)
+    assert video.notes.get("order", "")[: len(note or "")] == (note or "")
+    assert bool(video.notes) == bool(note)
 
 
 def test_labels_with_numbers_are_those_of_b_frames_as_they_are_shown(tmp_path: Path) -> None:
@@ -218,8 +218,8 @@ def test_labels_with_numbers_are_those_of_b_frames_as_they_are_shown(tmp_path: P
     labels = LabelSettings(road=(0,))
     config = LogConfig(truth=LabelPlace(str(tmp_path / "labels"), first=0), labels=labels)
     with open_log(path, config) as log:
-        found = {frame.number: frame for frame in log.frames(log.select())}
-        numbers = [Path(found[n].labels["/truth"].place).stem for n in range(10)]
+        by_number = {frame.number: frame for frame in log.frames(log.select())}
+        numbers = [Path(by_number[n].labels["/truth"].place).stem for n in range(10)]
     assert [int(number) for number in numbers] == [place for place, _ in video]
 
 

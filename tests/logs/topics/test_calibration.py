@@ -1,4 +1,4 @@
-"""The calibration of a camera and its mounting, in the messages of three kinds of writers."""
+"""The calibration of a camera and its mounting, in messages made here and of real writers."""
 
 import json
 import math
@@ -197,7 +197,7 @@ def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("fields", "reason"),
     [
         ({"k": [0.0] * 9}, "focal length is 0"),
         ({"k": [-50.0, *K[1:]]}, "its focal length is -50 and 51"),
@@ -213,10 +213,10 @@ def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
         ({"frame_id": "rear"}, "none of /front/info is clearly of"),
     ],
 )
-def test_what_cannot_be_used_is_said_and_not_used(tmp_path, given, said):
-    lens, why = front(tmp_path, **given)
+def test_what_cannot_be_used_is_said_and_not_used(tmp_path, fields, reason):
+    lens, why = front(tmp_path, **fields)
     assert lens is None
-    assert said in why
+    assert reason in why
 
 
 def test_a_log_without_a_calibration_says_nothing(tmp_path):
@@ -237,7 +237,7 @@ def test_a_place_that_no_transform_leads_to_is_not_known(tmp_path: Path, tree: l
 
 
 @pytest.mark.parametrize(
-    ("at", "turn", "said"),
+    ("at", "turn", "reason"),
     [
         ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.5), "mast has a quaternion of length 0.5, not 1"),
         ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0), "mast has a quaternion of length 0, not 1"),
@@ -246,24 +246,24 @@ def test_a_place_that_no_transform_leads_to_is_not_known(tmp_path: Path, tree: l
         ((1.0, 0.0, 1e300), (0.0, 0.0, 0.0, 1.0), "mast is moved by 1, 0, 1e+300 m"),
     ],
 )
-def test_a_transform_that_is_none_is_said_and_not_used(tmp_path, at, turn, said):
+def test_a_transform_that_is_none_is_said_and_not_used(tmp_path, at, turn, reason):
     rotation = SimpleNamespace(as_quat=lambda: np.array(turn))
     tree = [TREE[0], ("mast", "base_link", at, cast("Rotation", rotation))]
     lens, why = front(tmp_path, tree)
     assert lens.mounting is None
-    assert why.startswith(f"its place is not known: the transform of {said}")
+    assert why.startswith(f"its place is not known: the transform of {reason}")
 
 
 def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
     lens = Calibration("/c", 64, 48, tuple(K)).scaled(32, 16)
     point = np.array([0.3, -0.2, 2.0])
-    whole, less = (np.array(m).reshape(3, 3) @ point for m in (K, lens.matrix))
+    full, less = (np.array(m).reshape(3, 3) @ point for m in (K, lens.matrix))
     # The image's corner, half a pixel before the centre of its first one, stays where it is.
-    assert less[:2] / less[2] + 0.5 == pytest.approx((whole[:2] / whole[2] + 0.5) / [2, 3])
+    assert less[:2] / less[2] + 0.5 == pytest.approx((full[:2] / full[2] + 0.5) / [2, 3])
 
 
 @pytest.mark.parametrize(
-    ("given", "matrix"),
+    ("fields", "matrix"),
     [
         # A corner comes off first, and then all is divided, as in ROS's image_geometry.
         ({"size": (128, 96), "binning": (2, 2), "k": [100.0, 0, 64, 0, 102, 48, 0, 0, 1]}, K),
@@ -284,15 +284,15 @@ def test_a_calibration_of_reduced_frames_projects_to_the_reduced_places():
         ),
     ],
 )
-def test_a_part_of_the_sensor_and_binned_pixels_are_as_ros_means_them(tmp_path, given, matrix):
-    lens, why = front(tmp_path, **given)
+def test_a_part_of_the_sensor_and_binned_pixels_are_as_ros_means_them(tmp_path, fields, matrix):
+    lens, why = front(tmp_path, **fields)
     assert (lens.width, lens.height) == SIZE
     assert lens.matrix == tuple(matrix)
     assert why == ""
 
 
 @pytest.mark.parametrize(
-    ("given", "focal", "said"),
+    ("fields", "focal", "reason"),
     [
         ({"size": (128, 96)}, 25.0, "it is for images of 128x96, and scaled"),
         ({"size": (32, 24)}, 100.0, "it is for images of 32x24, and scaled"),
@@ -301,10 +301,12 @@ def test_a_part_of_the_sensor_and_binned_pixels_are_as_ros_means_them(tmp_path, 
         ({"k": [100.0, 0, 64, 0, 102, 48, 0, 0, 1]}, 100.0, "its centre, 64, 48, is far from"),
     ],
 )
-def test_a_lens_of_another_resolution_is_scaled_or_doubted_and_said(tmp_path, given, focal, said):
-    lens, why = front(tmp_path, **given)
+def test_a_lens_of_another_resolution_is_scaled_or_doubted_and_said(
+    tmp_path, fields, focal, reason
+):
+    lens, why = front(tmp_path, **fields)
     assert (lens.width, lens.height, lens.matrix[0]) == (*SIZE, focal)
-    assert said in why
+    assert reason in why
 
 
 P = [40.0, 0, 30, 0, 0, 41.0, 20, 0, 0, 0, 1, 0]
@@ -312,24 +314,24 @@ SAME = [*K[:3], 0.0, *K[3:6], 0.0, *K[6:], 0.0]
 
 
 @pytest.mark.parametrize(
-    ("topic", "given", "focal", "bends"),
+    ("topic", "fields", "focal", "bends"),
     [
         ("/front/image_rect_color/compressed", {"p": P}, 40.0, False),
         ("/front/rect/image/compressed", {"p": P}, 40.0, False),
         ("/front/rectified/image", {"p": P}, 40.0, False),
         ("/front/imageUndistorted", {"p": P}, 40.0, False),
         ("/front/image_raw", {"p": P}, 50.0, True),
-        # What RealSense calls so bears its distortion.
+        # RealSense gives this name to images with distortion.
         ("/front/image_rect_raw", {"p": P}, 50.0, True),
         ("/front/image_rect", {"p": SAME}, 50.0, True),
         ("/front/image_rect", {"p": SAME, "d": [0.0] * 5}, 50.0, False),
         ("/front/image_rect", {"d": [0.0] * 5}, 50.0, False),
     ],
 )
-def test_names_and_numbers_tell_whether_images_are_rectified(tmp_path, topic, given, focal, bends):
-    lens, why = front(tmp_path, topic=topic, **given)
+def test_names_and_numbers_tell_whether_images_are_rectified(tmp_path, topic, fields, focal, bends):
+    lens, why = front(tmp_path, topic=topic, **fields)
     assert (lens.matrix[0], lens.bends) == (focal, bends)
-    assert ("taken as not rectified" in why) == (given.get("p") == SAME and bends)
+    assert ("taken as not rectified" in why) == (fields.get("p") == SAME and bends)
 
 
 def test_rectified_images_without_a_projection_have_no_lens(tmp_path: Path):

@@ -1,4 +1,4 @@
-"""Which topics are picked, and when the user is asked."""
+"""Which topics are picked, when the user is asked, and which truth is which camera's of a rig."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -67,11 +67,10 @@ def test_transports_of_one_camera_are_one_camera(names: tuple[str, ...], chosen:
 
 def test_an_unknown_topic_lists_the_valid_ones() -> None:
     topics = [camera("/left"), camera("/right"), other("/imu")]
-    with pytest.raises(
-        LogError, match=r"`topics.image` /lef: is not in the log; .*: /left, /right"
-    ):
+    with pytest.raises(LogError, match=r"/lef is not in the log; .*: /left, /right") as refused:
         choose_image(topics, "/lef")
-    with pytest.raises(LogError, match=r"/imu: carries no images"):
+    assert refused.value.setting == "topics.image"
+    with pytest.raises(LogError, match=r"/imu carries no images"):
         choose_image(topics, "/imu")
 
 

@@ -17,7 +17,7 @@ from tests.logs.truth.test_shapes import labels_of, percent, task
 
 IMAGES = 5
 FILES = 40
-"""Of each format."""
+"""Numbers of images and of changed files, for each format."""
 BAD = (None, "x", [], {}, math.nan, math.inf, 1e300, [None], [[]], "")
 
 
@@ -180,8 +180,8 @@ def judged(before, after, notes, image):
 
 
 def files_of(make, drawing):
-    whole = [make(shapes) for shapes in drawing] if make in ONE_IMAGE else [make(drawing)]
-    return {f"{n}{ENDINGS.get(make, '.json')}": content for n, content in enumerate(whole)}
+    contents = [make(shapes) for shapes in drawing] if make in ONE_IMAGE else [make(drawing)]
+    return {f"{n}{ENDINGS.get(make, '.json')}": content for n, content in enumerate(contents)}
 
 
 def write(folder, files):

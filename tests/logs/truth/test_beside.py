@@ -18,6 +18,7 @@ from roadeval.logs.truth.beside import GREATEST, labels_in
 from roadeval.logs.truth.formats.coco import lengths_in
 from roadeval.logs.truth.labels import label_files
 from roadeval.logs.writing.writer import LogWriter
+from roadeval.runtime.sentence import Setting
 from tests.e2e.commands import here
 from tests.fixtures.shared import shared
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
@@ -60,11 +61,11 @@ def select(drive: Path, path: Path, *road: int | str, resize: bool = False, **pl
         return selection, [frame.number for frame in frames if frame.labelled], frames
 
 
-def refusal(*given: Any, **place: Any) -> str:
+def refusal(*arguments: Any, **place: Any) -> LogError:
     with pytest.raises(LogError) as caught:
-        select(*given, **place)
+        select(*arguments, **place)
     assert "\n" not in str(caught.value)
-    return str(caught.value)
+    return caught.value
 
 
 def replay(drive: Path, path: Path, *words: Any):
@@ -86,7 +87,7 @@ def test_numbers_count_from_the_first_frame_s_which_is_asked_for_if_nothing_tell
     drive, tmp_path
 ):
     path = images(tmp_path / "truth", "2.png", "4.png")
-    assert "number 0 or 1: give `truth.first` 0 or" in refusal(drive, path)
+    assert Setting("truth.first") in refusal(drive, path).remedy.parts
     assert select(drive, path, first=0)[1] == [2, 4]
     assert select(drive, path, first=1)[1] == [1, 3]
     selection, labelled, _ = select(drive, images(path, "6.png"))
@@ -99,20 +100,22 @@ def test_labels_of_several_cameras_are_refused_until_one_is_chosen(drive, tmp_pa
     path.mkdir()
     for side, count in (("left", 4), ("right", 6)):
         images(path / side, *(f"{number}.png" for number in range(count)))
-    assert "`truth.names`, as 'left/*'" in refusal(drive, path)
+    assert "`truth.names`, as 'left/*'" in refusal(drive, path).remedy
     assert select(drive, path, names="left/*")[1] == [0, 1, 2, 3]
-    assert "no label has a name as `truth.names` rear/*" in refusal(drive, path, names="rear/*")
+    other = refusal(drive, path, names="rear/*")
+    assert other.setting == "truth.names"
+    assert "no label has a name as rear/*" in other.problem
 
 
 def test_names_of_no_image_are_refused_with_three_of_each(drive, tmp_path):
     named = images(tmp_path / "images", *(f"a{letter}.png" for letter in "uvwxyz"))
     path = images(tmp_path / "truth", *(f"b{letter}.png" for letter in "uvwx"))
-    message = refusal(drive, path, images=str(named))
+    message = refusal(drive, path, images=str(named)).problem
     assert "theirs are bu.png, bv.png, bw.png, ..., the images' au.png, av.png, aw.png" in message
 
 
 @pytest.mark.parametrize("path", shared("failures"))
-def test_shared_labels_in_wrong_forms_meet_their_frames_or_are_refused(path):
+def test_shared_labels_in_wrong_forms_meet_their_frames_or_are_refusal(path):
     log, labels = path / "labels" / "bare.mcap", path / "labels"
     lacking = select(log, labels / "lab1m")[1]
     assert lacking == [number for number in range(30) if number != 15]
@@ -121,7 +124,7 @@ def test_shared_labels_in_wrong_forms_meet_their_frames_or_are_refused(path):
     named = select(log, labels / "prefix_names", images=str(labels / "lab"))[1]
     assert named == [*range(30)]
     for name in ("other_camera_names.json", "cvat_two_cameras.xml"):
-        assert "`truth.names`" in refusal(log, labels / name, "road")
+        assert "`truth.names`" in refusal(log, labels / name, "road").remedy
     config = LogConfig(labels=LabelSettings(road=(3,), ignore=(11,)))
     with open_log(path / "one_stamp_in_the_future.mcap", config) as log:
         assert sum(frame.labelled for frame in log.frames(log.select())) == 40
@@ -144,7 +147,7 @@ def test_labels_that_find_no_frame_are_told(drive, tmp_path):
 def test_another_size_is_refused_or_scaled(drive, tmp_path):
     path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
     images(path, "3.png", pixels=LOWER[::2, ::2])
-    assert refusal(drive, path).endswith(
+    assert str(refusal(drive, path)).endswith(
         "3.png is 24x16, but /camera is 48x32: scale the labels with `topics.resize_truth`"
     )
     _, _, frames = select(drive, path, resize=True)
@@ -153,8 +156,8 @@ def test_another_size_is_refused_or_scaled(drive, tmp_path):
 
 def test_a_damaged_file_among_many_loses_its_frame(drive, tmp_path):
     path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
-    whole = (path / "3.png").read_bytes()
-    (path / "3.png").write_bytes(whole[:50])
+    content = (path / "3.png").read_bytes()
+    (path / "3.png").write_bytes(content[:50])
     run, summary = replay(drive, path)
     assert run.returncode == 3
     assert f"lost: frame 3: {path / '3.png'}: " in run.stderr
@@ -184,8 +187,8 @@ def test_a_damaged_file_alone_is_one_line(drive, tmp_path, name):
 @pytest.mark.parametrize("name", ["coco/labelformat.json", "cvat/annotations.xml"])
 @pytest.mark.parametrize("share", [0.3, 0.9])
 def test_a_file_that_ends_early_is_refused_alone_or_beside_another(tmp_path, name, share):
-    whole = (LABELS / name).read_text()
-    path = written(tmp_path / "truth", f"b.{name[-4:]}", whole[: int(share * len(whole))])
+    content = (LABELS / name).read_text()
+    path = written(tmp_path / "truth", f"b.{name[-4:]}", content[: int(share * len(content))])
     for place in (path, path.parent):
         with pytest.raises(LogError, match=r"it is no (JSON|XML), or ends early \(line \d+, col"):
             labels_in(place, SIZE)
@@ -203,7 +206,7 @@ def test_a_note_or_a_hidden_file_beside_label_images_is_no_label(drive, tmp_path
 
 
 def test_labels_lie_below_a_list_of_names(drive, tmp_path):
-    """As Label Studio exports them."""
+    """Label Studio exports labels in this way."""
     path = tmp_path / "export"
     shutil.copytree(LABELS / "yolo" / "labels", path / "labels")
     images(path / "images", "frame_0000.png")
@@ -255,7 +258,7 @@ WRONG = {
 def test_what_cannot_be_drawn_is_one_line(drive, tmp_path, what):
     began = time.perf_counter()
     path = written(tmp_path / "truth", "a.json", WRONG[what])
-    assert str(path) in refusal(drive, path, "road")
+    assert str(path) in str(refusal(drive, path, "road"))
     assert time.perf_counter() - began < 20
 
 

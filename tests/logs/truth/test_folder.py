@@ -1,4 +1,4 @@
-"""Which mask of a folder belongs to which frame, by its name."""
+"""Which mask of a folder belongs to which frame, by its name; and what `pick.json` may say."""
 
 import io
 from dataclasses import replace
@@ -35,9 +35,9 @@ def opened(path: Path, size=None, **settings) -> NamedLabels:
 
 
 def keys(path, **settings):
-    found = opened(path, **settings)
-    names = [label.path.name for label in found.labels]
-    return found.by, dict(zip(names, found.log_times.tolist(), strict=True))
+    labels = opened(path, **settings)
+    names = [label.path.name for label in labels.labels]
+    return labels.by, dict(zip(names, labels.log_times.tolist(), strict=True))
 
 
 def test_names_that_are_times_are_stamps(tmp_path):

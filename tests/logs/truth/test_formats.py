@@ -68,35 +68,35 @@ FOREIGN = {
 
 def values_of(path, size=SIZE):
     """By the number of each frame the values of its label, and the values of the classes."""
-    found = opened(path, size)
-    pictures = [label.picture(label.content(), Limits()) for label in found.labels]
+    labels = opened(path, size)
+    pictures = [label.picture(label.content(), Limits()) for label in labels.labels]
     arrays = [np.frombuffer(p.data, "<u2").reshape(p.height, p.width) for p in pictures]
-    return dict(zip(found.log_times.tolist(), arrays, strict=True)), found.origin
+    return dict(zip(labels.log_times.tolist(), arrays, strict=True)), labels.origin
 
 
 def names_of(path, size=SIZE):
     values, origin = values_of(path, size)
     called = {"0": "road", "1": "car", "2": "ego"}  # in the files of YOLO, which have numbers
-    known = sorted(origin.classes, key=origin.classes.__getitem__)
-    names = np.array(["", *(called.get(name, name) for name in known)])
-    return {number: names[each] for number, each in values.items()}
+    class_names = sorted(origin.classes, key=origin.classes.__getitem__)
+    names = np.array(["", *(called.get(name, name) for name in class_names)])
+    return {number: names[pixels] for number, pixels in values.items()}
 
 
 @pytest.mark.parametrize("path", FOREIGN)
 def test_a_file_of_the_formats_own_tool_gives_the_pixels_of_scikit_image(path):
-    found = names_of(LABELS / path)
-    assert found.keys() == FOREIGN[path].keys()
+    names = names_of(LABELS / path)
+    assert names.keys() == FOREIGN[path].keys()
     for number, expected in FOREIGN[path].items():
-        np.testing.assert_array_equal(found[number], expected)
+        np.testing.assert_array_equal(names[number], expected)
 
 
 def test_rectangles_of_x_anylabeling_may_be_turned():
-    found = names_of(LABELS / "x_anylabeling")
-    np.testing.assert_array_equal(found[0], WHOLE[0])
+    names = names_of(LABELS / "x_anylabeling")
+    np.testing.assert_array_equal(names[0], WHOLE[0])
     expected = painted()
     expected[inside([(20.2, 13.3), (31.4, 13.3), (31.4, 22.2), (20.2, 22.2)])] = "car"
     expected[inside([(20.2, 20.3), (30.1, 16.3), (34.9, 28.4), (25.0, 32.4)])] = "road"
-    np.testing.assert_array_equal(found[3], expected)
+    np.testing.assert_array_equal(names[3], expected)
 
 
 def test_what_no_shape_covers_is_non_road():
@@ -106,17 +106,18 @@ def test_what_no_shape_covers_is_non_road():
 
 
 @pytest.mark.parametrize(
-    ("labels", "problem"),
+    ("labels", "setting", "problem"),
     [
-        (LabelSettings(("Road",)), "`labels.road` Road does not occur in labels, which has the"),
-        (LabelSettings(("road",), ("sky",)), "`labels.ignore` sky does not occur in labels, which"),
-        (LabelSettings(), "labels has the classes car (3 labels), road (3 labels), ego (1 label):"),
+        (LabelSettings(("Road",)), "labels.road", "Road does not occur in labels, which has the"),
+        (LabelSettings(("road",), ("sky",)), "labels.ignore", "sky does not occur in labels"),
+        (LabelSettings(), "", "labels has the classes car (3 labels), road (3 labels), ego (1"),
     ],
 )
-def test_a_class_that_does_not_occur_is_refused_with_the_list(labels, problem):
+def test_a_class_that_does_not_occur_is_refused_with_the_list(labels, setting, problem):
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
-    with pytest.raises(LogError, match=re.escape(problem)):
+    with pytest.raises(LogError, match=re.escape(problem)) as refused:
         understand_classes(labels, origin, "labels")
+    assert refused.value.setting == setting
     with pytest.raises(LogError, match=r"ego \(1 label\); 2 labels of it cannot be read"):
         understand_classes(LabelSettings(("Road",)), replace(origin, lost=2), "labels")
 
@@ -157,16 +158,16 @@ def test_labels_with_the_names_of_a_data_set_belong_to_their_images(name, tmp_pa
     for folder, file in (("images", image), ("labels", label)):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / f"{file}.png").touch()
-    found = opened(tmp_path / "labels", images=str(tmp_path / "images"))
-    assert (found.by, found.log_times.tolist(), found.nameless) == ("name", [0], 0)
+    labels = opened(tmp_path / "labels", images=str(tmp_path / "images"))
+    assert (labels.by, labels.log_times.tolist(), labels.nameless) == ("name", [0], 0)
 
 
 @pytest.mark.parametrize("path", ["cvat/annotations.xml", "labelme", "label_studio/tasks.json"])
 def test_drawn_labels_belong_to_the_images_that_they_name(path, tmp_path):
     for number in (3, 1, 0, 2):
         (tmp_path / f"frame_{number:04d}.png").touch()
-    found = opened(LABELS / path, SIZE, images=str(tmp_path))
-    assert (found.by, found.log_times.tolist(), found.images) == ("name", [0, 1, 3], 4)
+    labels = opened(LABELS / path, SIZE, images=str(tmp_path))
+    assert (labels.by, labels.log_times.tolist(), labels.images) == ("name", [0, 1, 3], 4)
 
 
 # --- The rules ------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What the values of a label image mean."""
+"""The meaning of the values of a label image."""
 
 import io
 import subprocess
@@ -51,16 +51,16 @@ def test_a_mask_is_understood_by_itself_and_other_values_as_they_are_named(
 )
 def test_values_that_mean_road_in_some_pictures_and_ignored_in_others_are_asked_for(pictures):
     """Two annotators' labels in one folder: 255 would be ignored in half of them."""
-    with pytest.raises(LogError, match=r"/mask holds the values 0 1 255: 255 is road in masks of"):
+    with pytest.raises(LogError, match=r"/mask holds the values 0 1 255; 255 is road in masks of"):
         understand(LabelSettings(), pictures, "/mask")
-    given = understand(LabelSettings(road=(1, 255)), pictures, "/mask")
-    assert given.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
+    meaning = understand(LabelSettings(road=(1, 255)), pictures, "/mask")
+    assert meaning.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
 
 
 @pytest.mark.parametrize(
     ("values", "other", "problem"),
     [
-        ({0, 1}, [0, 255], "it holds 255 but no 1: 255 is road in masks of 0 and"),
+        ({0, 1}, [0, 255], "it holds 255 but no 1; 255 is road in masks of 0 and"),
         ({0, 255}, [0, 7], "holds the value 7"),
     ],
 )
@@ -74,25 +74,26 @@ def test_a_picture_whose_values_mean_something_else_than_those_looked_at_is_no_l
 
 
 @pytest.mark.parametrize(
-    ("labels", "problem"),
+    ("labels", "setting", "problem"),
     [
-        (LabelSettings(), r"/labels holds the values 0 3 11: .*`labels.road`"),
-        (LabelSettings(road=("sky",)), "`labels.road` sky does not occur in /labels"),
-        (LabelSettings(road=(3,), ignore=("sky",)), "`labels.ignore` sky does not occur in"),
-        (LabelSettings(road=(7,)), r"`labels.road` 7 does not occur in /labels.* 0 3 11"),
-        (LabelSettings(road=(3,), ignore=(9,)), "`labels.ignore` 9 does not occur in /labels"),
+        (LabelSettings(), "", r"/labels holds the values 0 3 11; .*`labels.road`"),
+        (LabelSettings(road=("sky",)), "labels.road", "sky does not occur in /labels"),
+        (LabelSettings(road=(3,), ignore=("sky",)), "labels.ignore", "sky does not occur in"),
+        (LabelSettings(road=(7,)), "labels.road", r"7 does not occur in /labels.* 0 3 11"),
+        (LabelSettings(road=(3,), ignore=(9,)), "labels.ignore", "9 does not occur in /labels"),
     ],
 )
-def test_a_value_that_is_not_named_or_does_not_occur_is_refused(labels, problem) -> None:
-    with pytest.raises(LogError, match=problem):
+def test_a_value_that_is_not_named_or_does_not_occur_is_refused(labels, setting, problem) -> None:
+    with pytest.raises(LogError, match=problem) as refused:
         truth([0, 3, 11], labels)
+    assert refused.value.setting == setting
 
 
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        ({"ignore": (3,)}, r"`labels\.ignore` needs `labels\.road`"),
-        ({"ignore_colors": ((1, 2, 3),)}, r"`labels\.ignore_colors` needs `labels\.road_colors`"),
+        ({"ignore": (3,)}, "`ignore`: needs `road`"),
+        ({"ignore_colors": ((1, 2, 3),)}, "`ignore_colors`: needs `road_colors`"),
         ({"road": (1,), "road_colors": ((1, 2, 3),)}, "as values or as colours"),
     ],
 )
@@ -126,7 +127,7 @@ def test_colours_can_mean_road_and_ignore() -> None:
 
 def test_colours_are_asked_for_with_those_seen() -> None:
     with pytest.raises(
-        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*`labels.road_colors`"
+        LogError, match=r"/labels holds the colours 0,0,255 64,32,32; .*`labels.road_colors`"
     ):
         count_values(colors([ROAD, SKY]), LabelSettings(), "/labels", LIMITS)
 

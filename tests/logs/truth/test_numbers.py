@@ -1,4 +1,4 @@
-"""Which digits of the names number the frames, from which number on, and of which camera."""
+"""Which digits of the names number the frames, of which camera; and where images are lost."""
 
 import random
 import uuid
@@ -38,9 +38,9 @@ from tests.logs.making import png
 def frames_of(labelled, frames, **settings):
     """Return the frame of each label, by its name."""
     labels = [NamedLabel(Path(name), bytes, None) for name in labelled]
-    found = find_keys(LabelSet(labels), "labels", LabelPlace(**settings), Limits(), frames)
-    paths = (str(label.path) for label in found.labels)
-    return dict(zip(paths, found.log_times.tolist(), strict=True))
+    labels = find_keys(LabelSet(labels), "labels", LabelPlace(**settings), Limits(), frames)
+    paths = (str(label.path) for label in labels.labels)
+    return dict(zip(paths, labels.log_times.tolist(), strict=True))
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_what_the_numbers_say_of_the_first_frame_is_taken_or_else_asked_for(numb
     if first is not None:
         assert [*frames_of(names, frames).values()] == [number - first for number in numbers]
         return
-    with pytest.raises(LogError, match=r"give `truth\.first` 0 or `truth.first` 1"):
+    with pytest.raises(LogError, match=r"number 0 or 1; set `truth.first` to 0 or to 1"):
         frames_of(names, frames)
     for chosen in (0, 1):
         assert [*frames_of(names, frames, first=chosen).values()] == [n - chosen for n in numbers]
@@ -112,8 +112,8 @@ def test_names_that_differ_in_more_than_a_number_are_refused_with_the_way_to_sho
 
 
 def test_the_number_is_taken_where_it_is_shown():
-    found = frames_of([f"take{n + 1}_{n * 7}.png" for n in range(4)], 30, names="*_{number}.png")
-    assert [*found.values()] == [0, 7, 14, 21]
+    numbers = frames_of([f"take{n + 1}_{n * 7}.png" for n in range(4)], 30, names="*_{number}.png")
+    assert [*numbers.values()] == [0, 7, 14, 21]
 
 
 def drawn_set(seed):
@@ -132,13 +132,13 @@ def drawn_set(seed):
     )
     odd = chance.choice([0, 0, 0, 0.1, 0.5])
     name, ending = f"{{number:0{chance.choice([1, 4, 6])}}}", chance.choice([".png", ".json", ""])
-    found = {}
+    names = {}
     for frame in chosen:
         text = uuid.UUID(int=chance.getrandbits(128)).hex
         parts = {"hash": text, "short": text[:8], "any": chance.randint(0, 12)}
         tail = chance.choice([" (1)", "_2", "_v3"]) if chance.random() < odd else behind
-        found[(before + name + tail).format(number=frame + first, **parts) + ending] = frame
-    return found, frames, first
+        names[(before + name + tail).format(number=frame + first, **parts) + ending] = frame
+    return names, frames, first
 
 
 def test_of_random_sets_no_label_is_paired_with_a_wrong_frame():
@@ -148,8 +148,8 @@ def test_of_random_sets_no_label_is_paired_with_a_wrong_frame():
         expected, frames, first = drawn_set(seed)
         for settings in ({}, {"first": first}):
             with suppress(LogError):
-                found = frames_of(expected, frames, **settings)
-                assert found == expected, seed
+                numbers = frames_of(expected, frames, **settings)
+                assert numbers == expected, seed
                 taken += 1
     assert taken > 500
 
@@ -207,9 +207,9 @@ def test_names_of_the_camera_itself_are_taken(names, topic, frame_id):
 )
 def test_what_all_labels_have_around_the_name_of_the_image_is_no_part_of_it(label, image):
     numbers = [f"{number:04}" for number in (7, 8, 10)]
-    found = images_of(*([Path(name.format(n)) for n in numbers] for name in (label, image)))
+    pairs = images_of(*([Path(name.format(n)) for n in numbers] for name in (label, image)))
     expected = {Path(label.format(n)): Path(image.format(n)) for n in numbers}
-    assert found == expected
+    assert pairs == expected
 
 
 BITS = 6

@@ -1,4 +1,4 @@
-"""Which label belongs to which image."""
+"""Which label belongs to which image, of the same clock and of another."""
 
 from collections.abc import Sequence
 
@@ -137,7 +137,7 @@ class Topic:
         ([0, 0, 0], [100, 100, 100], Clock.ORDER),
         ([7], [100], Clock.STAMP),
         ([0], [100], Clock.LOG_TIME),
-        # Of all images but one nothing can be read: that its stamp is the only one says nothing.
+        # If only one image can be read, its stamp does not show whether stamps differ.
         ([BAD, 7, BAD], TIMES, Clock.STAMP),
         ([*[BAD] * 20, 7, 8], list(range(22)), Clock.STAMP),
     ],
@@ -147,7 +147,7 @@ def test_stamps_count_unless_they_are_zero_or_equal(stamps, times, clock):
 
 
 @pytest.mark.parametrize(
-    ("stamps", "times", "asked_ms", "found"),
+    ("stamps", "times", "setting_ms", "expected"),
     [
         ([0, 1000, 2000, 3000], TIMES, None, 50),
         # Written in one go: the log times say nothing.
@@ -159,9 +159,9 @@ def test_stamps_count_unless_they_are_zero_or_equal(stamps, times, clock):
     ],
 )
 def test_half_the_frame_period_may_lie_between_an_image_and_its_label(
-    stamps, times, asked_ms, found
+    stamps, times, setting_ms, expected
 ):
-    assert tolerance(Topic(stamps, times), asked_ms) == found
+    assert tolerance(Topic(stamps, times), setting_ms) == expected
 
 
 @pytest.mark.parametrize(
@@ -178,9 +178,9 @@ def test_half_the_frame_period_may_lie_between_an_image_and_its_label(
 def test_equal_stamps_are_a_pair_in_whatever_order_they_come(stamps, labels):
     pairing = Pairing(Stamps(stamps), Stamps(labels(stamps)), 4, is_small=True)
     partners = Partners(pairing)
-    found = [partners.of(image) for image in range(len(stamps))]
-    assert [labels(stamps)[label] for label in found] == stamps
-    assert len({*found}) == len(found)
+    partner_labels = [partners.of(image) for image in range(len(stamps))]
+    assert [labels(stamps)[label] for label in partner_labels] == stamps
+    assert len({*partner_labels}) == len(partner_labels)
     assert partners.unpaired(of_all=True) == (0, 0)
 
 

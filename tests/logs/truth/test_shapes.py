@@ -1,4 +1,4 @@
-"""What annotation tools can draw beyond plain outlines, and what becomes of each shape."""
+"""Shapes of annotation tools beyond plain outlines, and the pixels of each."""
 
 import numpy as np
 import pytest
@@ -13,30 +13,30 @@ from tests.logs.truth.test_formats import HEIGHT, SIZE, WIDTH, inside
 SQUARE = [[10, 10], [20, 10], [20, 20], [10, 20]]
 
 
-def read(folder, name, content, *, ignore=(), road=("road",), **asked):
+def read(folder, name, content, *, ignore=(), road=("road",), **settings):
     """The truth of each label of a file by its name, and the warnings."""
     path = written(folder / "truth", name, content)
-    return labels_of(path, MaskSettings(str(path), labels=LabelSettings(road, ignore), **asked))
+    return labels_of(path, MaskSettings(str(path), labels=LabelSettings(road, ignore), **settings))
 
 
 def labels_of(path, settings):
     """The truth of each label by its name, and the warnings; lost labels by their reason."""
     origin = labels_in(path, SIZE, settings)
-    found = {}
+    truths = {}
     for label in origin.labels:
         try:
             picture = label.picture(label.content(), Limits())
         except BadMessage as error:
-            found[label.path.name] = str(error)
+            truths[label.path.name] = str(error)
         else:
             values = np.frombuffer(picture.data, "<u2").reshape(picture.height, picture.width)
             names = ["", *origin.classes]
-            found[label.path.name] = np.array(names)[values]
-    return found, origin.notes
+            truths[label.path.name] = np.array(names)[values]
+    return truths, origin.notes
 
 
-def one(folder, name, content, **asked):
-    (label,) = read(folder, name, content, **asked)[0].values()
+def one(folder, name, content, **settings):
+    (label,) = read(folder, name, content, **settings)[0].values()
     return label
 
 
@@ -139,9 +139,9 @@ def test_two_annotators_of_an_image_cost_it_and_are_named(tmp_path):
     one_task = [task(POLYGON) | {"annotations": [made["annotations"][0] for made in both]}]
     for content in (one_task, both):
         other = task(POLYGON, data={"image": "2.png"})  # its number is the same
-        found, _ = read(tmp_path, "a.json", [*content, other])
-        assert found["1.png"].startswith("it has 2 annotations (of annotators 1 and 2): mark one")
-        assert (found["2.png"] == "road").sum() == 100
+        truths, _ = read(tmp_path, "a.json", [*content, other])
+        assert truths["1.png"].startswith("it has 2 annotations (of annotators 1 and 2): mark one")
+        assert (truths["2.png"] == "road").sum() == 100
 
 
 def test_an_address_without_an_ending_names_its_image(tmp_path):
@@ -195,7 +195,7 @@ def test_turned_boxes_cuboids_ellipses_and_circles_are_drawn(tmp_path, what):
 
 @pytest.mark.parametrize("types", ["LCCCL", "LCCL"])
 def test_curves_of_bdd100k_are_cubic(tmp_path, types):
-    """As ``poly_to_patch`` of bdd100k 1.0 draws them, and as Scalabel 0.3 has them."""
+    """The curves are those of ``poly_to_patch`` in bdd100k 1.0, and of Scalabel 0.3."""
     points = [[10.2, 25.3], [10.2, 5.3], [35.2, 5.3], [35.2, 25.3], [22.2, 29.3]]
     vertices = points if types == "LCCCL" else points[:4]
     t = np.linspace(0, 1, 200)[:, None]
@@ -227,9 +227,9 @@ def test_a_mask_of_another_size_than_its_image_costs_that_image(tmp_path):
     content["annotations"].append(
         content["annotations"][0] | {"image_id": 2, "segmentation": [[0, 0, 9, 0, 9, 9]]}
     )
-    found, _ = read(tmp_path, "a.json", content)
-    assert found["1.png"] == "a mask of road that is 32x48, on an image of 48x32"
-    assert (found["2.png"] == "road").any()
+    truths, _ = read(tmp_path, "a.json", content)
+    assert truths["1.png"] == "a mask of road that is 32x48, on an image of 48x32"
+    assert (truths["2.png"] == "road").any()
 
 
 def test_a_damaged_file_costs_its_image_where_each_file_has_one(tmp_path):
@@ -237,10 +237,10 @@ def test_a_damaged_file_costs_its_image_where_each_file_has_one(tmp_path):
         content = {"name": f"{n}", "frames": [{"objects": [TYPED]}]}
         path = written(tmp_path / "truth", f"{n}.json", content)
     path.write_text(path.read_text()[:-9])
-    asked = MaskSettings(str(path.parent), labels=LabelSettings(("road",)))
-    found, _ = labels_of(path.parent, asked)
-    assert found.pop("2.json").startswith("cannot be read as labels: it is no JSON, or ends early")
-    assert [(label == "road").sum() for label in found.values()] == [100, 100]
+    settings = MaskSettings(str(path.parent), labels=LabelSettings(("road",)))
+    truths, _ = labels_of(path.parent, settings)
+    assert truths.pop("2.json").startswith("cannot be read as labels: it is no JSON, or ends early")
+    assert [(label == "road").sum() for label in truths.values()] == [100, 100]
 
 
 # --- What the meaning of the classes decides ------------------------------------------------------
@@ -278,41 +278,41 @@ def counts(label):
 
 @pytest.mark.parametrize("order", ["car road", "road car"])
 def test_an_ignored_class_is_ignored_wherever_it_was_drawn(tmp_path, order):
-    found, notes = read(tmp_path, "a.json", streets(order), ignore=("car",))
-    assert counts(found["0.png"]) == {"": 768, "car": 100, "road": 668}
+    truths, notes = read(tmp_path, "a.json", streets(order), ignore=("car",))
+    assert counts(truths["0.png"]) == {"": 768, "car": 100, "road": 668}
     assert not notes
 
 
 def test_road_over_an_earlier_class_is_told_with_its_share(tmp_path):
     content = streets("car road", "road car", "tree road")
-    found, (note,) = read(tmp_path, "a.json", content)
-    assert counts(found["0.png"])["road"] == 768
+    truths, (note,) = read(tmp_path, "a.json", content)
+    assert counts(truths["0.png"])["road"] == 768
     assert note.startswith("road was drawn over car in 1 of 3 images: 13.0 % of the road's pixels")
 
 
 def test_images_without_a_road_are_told_and_can_be_left_out(tmp_path):
     content = streets("road", "car", "tree car", "road tree")
-    found, (note,) = read(tmp_path, "a.json", content)
-    assert len(found) == 4
+    truths, (note,) = read(tmp_path, "a.json", content)
+    assert len(truths) == 4
     assert note.startswith("2 of 4 images have shapes, but none of road, and are counted")
     assert "(1.png, 2.png); `truth.skip_roadless` leaves them out" in note
-    found, (note,) = read(tmp_path, "a.json", content, skip_roadless=True)
-    assert [*found] == ["0.png", "3.png"]
+    truths, (note,) = read(tmp_path, "a.json", content, skip_roadless=True)
+    assert [*truths] == ["0.png", "3.png"]
     assert "are left out (1.png, 2.png)" in note
 
 
 def test_boxes_without_an_outline_are_told_with_number_and_class(tmp_path):
     content = streets("road [car]", "road car", "road")
-    found, (note,) = read(tmp_path, "a.json", content)
-    assert counts(found["0.png"])["road"] == 768
+    truths, (note,) = read(tmp_path, "a.json", content)
+    assert counts(truths["0.png"])["road"] == 768
     assert note.startswith("1 of 5 shapes are not drawn: where they lie on the road, it counts as")
     assert note.endswith(": 1 of car (box without an outline)")
-    found, (note,) = read(tmp_path, "a.json", content, ignore=("car",))
-    assert counts(found["0.png"]) == {"": 768, "car": 100, "road": 668}
+    truths, (note,) = read(tmp_path, "a.json", content, ignore=("car",))
+    assert counts(truths["0.png"]) == {"": 768, "car": 100, "road": 668}
     assert "1 of 5 shapes are ignored as the boxes around them" in note
 
 
 def test_a_box_in_place_of_the_road_costs_its_image(tmp_path):
-    found, _ = read(tmp_path, "a.json", streets("[road]", "road"))
-    assert found["0.png"] == "road is drawn as a box without an outline"
-    assert counts(found["1.png"])["road"] == 768
+    truths, _ = read(tmp_path, "a.json", streets("[road]", "road"))
+    assert truths["0.png"] == "road is drawn as a box without an outline"
+    assert counts(truths["1.png"])["road"] == 768

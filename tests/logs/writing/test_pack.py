@@ -1,4 +1,4 @@
-"""Folders of images and videos become logs."""
+"""Folders of images and videos become logs, and results are written back to MCAP."""
 
 import errno
 import json
@@ -84,7 +84,7 @@ BMP = cv2.imencode(".bmp", np.arange(48, dtype=np.uint8).reshape(4, 4, 3))[1].to
 
 
 @pytest.mark.parametrize(
-    ("image", "masks", "rate_hz", "said"),
+    ("image", "masks", "rate_hz", "reason"),
     [
         ({"a.bmp": BMP}, None, None, r"a\.bmp: BMP, .*: save it as PNG"),
         ({"a.jpg": jpeg(grey(9))}, {"a.jpg": jpeg(grey(9))}, None, "JPEG changes label values"),
@@ -95,11 +95,11 @@ BMP = cv2.imencode(".bmp", np.arange(48, dtype=np.uint8).reshape(4, 4, 3))[1].to
     ],
 )
 def test_what_cannot_be_packed_is_refused(
-    tmp_path: Path, image: Any, masks: Any, rate_hz: float | None, said: str
+    tmp_path: Path, image: Any, masks: Any, rate_hz: float | None, reason: str
 ) -> None:
     images = folder(tmp_path / "images", image) if image else tmp_path / "missing"
     labels = folder(tmp_path / "masks", masks) if masks else None
-    with pytest.raises(LogError, match=said):
+    with pytest.raises(LogError, match=reason):
         pack(images, tmp_path / "a.mcap", masks=labels, rate_hz=rate_hz)
     assert not (tmp_path / "a.mcap").exists()
 
@@ -198,8 +198,8 @@ def test_labels_of_an_annotation_tool_are_said_to_be_for_a_replay(labels, tmp_pa
     with pytest.raises(LogError) as caught:
         pack(images, tmp_path / "log.mcap", masks=tmp_path / labels)
     assert "\n" not in str(caught.value)
-    asked = f"roadeval replay LOG.mcap --truth {tmp_path / labels} --truth-images {images}"
-    assert str(caught.value).endswith(asked)
+    command = f"roadeval replay LOG.mcap --truth {tmp_path / labels} --truth-images {images}"
+    assert str(caught.value).endswith(command)
     assert not (tmp_path / "log.mcap").exists()
 
 

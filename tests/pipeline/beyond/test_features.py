@@ -1,4 +1,4 @@
-"""Each group of features, held against SciPy, scikit-image or a plain loop."""
+"""Each group of features, held against SciPy, scikit-image or a plain loop; and exposure."""
 
 import cv2
 import numpy as np
@@ -9,7 +9,7 @@ from skimage.measure import block_reduce
 from skimage.transform import downscale_local_mean
 
 from roadeval.pipeline.beyond import exposure
-from roadeval.pipeline.beyond.features import GROUPS, beyond, features, names_of, outwards
+from roadeval.pipeline.beyond.features import GROUPS, beyond, features, greatest_outwards, names_of
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.scene import (
     LEVEL,
@@ -173,7 +173,7 @@ def test_a_column_is_walked_from_below_and_from_above(scene):
 @pytest.mark.parametrize("width", [1, 2, 7, 8])
 def test_a_row_is_walked_from_the_middle_outwards(width):
     plane = np.random.default_rng(width).random((3, width)).astype(np.float32)
-    values, half = outwards(plane), width // 2
+    values, half = greatest_outwards(plane), width // 2
     for y, x in np.ndindex(plane.shape):
         met = plane[y, half : x + 1] if x >= half else plane[y, x:half]
         assert values[y, x] == met.max()
@@ -205,7 +205,7 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
     for mine, plane in zip(values, expected, strict=False):
         close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
     for mine, plane in zip(values[10:15], values[:5], strict=True):
-        np.testing.assert_array_equal(mine, outwards(plane))
+        np.testing.assert_array_equal(mine, greatest_outwards(plane))
 
 
 def test_squared_barriers_are_costs_of_a_path(scene):

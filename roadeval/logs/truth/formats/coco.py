@@ -23,10 +23,12 @@ def _read_coco(
     annotations = defaultdict(list)
     for annotation in content["annotations"]:
         if "segments_info" in annotation:
-            raise LogError(f"{path}: COCO panoptic; save its masks as PNG files, one a frame")
+            raise LogError(
+                "COCO panoptic", where=path, remedy="save its masks as PNG files, one a frame"
+            )
         annotations[annotation["image_id"]].append(annotation)
     for number in annotations.keys() - images.keys():
-        raise LogError(f"{path}: annotations are of image {number}, which is not listed")
+        raise LogError(f"annotations are of image {number}, which is not listed", where=path)
     for number, image in images.items():
         size = drawn.size_in(image)
         shapes = _shapes(annotations[number], names, size)
@@ -39,8 +41,10 @@ def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[A
     for entry in listed:
         if numbered.setdefault(entry["id"], entry) is not entry:
             raise LogError(
-                f"{path}: two entries have the {what} id {entry['id']}, so it is not certain what "
-                "an annotation belongs to; merge the files by a tool that numbers them anew"
+                f"two entries have the {what} id {entry['id']}, so it is not certain what an "
+                "annotation belongs to",
+                where=path,
+                remedy="merge the files by a tool that numbers them anew",
             )
     return numbered
 

@@ -13,7 +13,7 @@ from roadeval.logs.truth import drawn
 
 def _read_cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if content.find("track") is not None:
-        raise LogError(f"{path}: tracks of a video; export it as CVAT for images")
+        raise LogError("tracks of a video", where=path, remedy="export it as CVAT for images")
     for image in content.iter("image"):
         yield drawn.DrawnLabel(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
 

@@ -33,8 +33,9 @@ def _read_via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.
     usual = [name for usual in _CLASS for name in sorted(names) if name.lower() == usual]
     if len(names) > 1 and not usual:
         raise LogError(
-            f"{path}: its regions have the attributes {', '.join(sorted(names))}: rename the one "
-            "that is the class to `class`"
+            f"its regions have the attributes {', '.join(sorted(names))}",
+            where=path,
+            remedy="rename the one that is the class to 'class'",
         )
     attribute = next(iter([*usual, *names]), "class")
     for image in _images(content):

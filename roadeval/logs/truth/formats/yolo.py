@@ -23,7 +23,7 @@ def _is_yolo(_: Path, content: str) -> bool:
 
 def _read_yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
     if size is None:
-        raise LogError(f"{path}: its points are shares of the image's size, which is not known")
+        raise LogError("its points are shares of the image's size, which is not known", where=path)
     yield drawn.DrawnLabel(str(path), size, _shapes(content, size))
 
 
