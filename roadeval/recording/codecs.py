@@ -1,4 +1,4 @@
-"""Codecs between a layer's array and its bytes in the recording: one a kind of layer.
+"""Codecs between a layer's array and its bytes in the recording, one for each kind of layer.
 
 =========  ==========================  ============================================================
 kind       in the file                 what is read back
@@ -11,17 +11,17 @@ scalar     grey PNG, coloured by the   the nearest of 256 levels over the range,
 rgb        PNG                         the same image; if not exact, a JPEG, reduced
 =========  ==========================  ============================================================
 
-What is reduced has the means of blocks of pixels, of two by two and so many that at most `COLUMNS`
-columns are left: it is there to be looked at, and a map of 1920x1200 pixels takes twice what the
-camera's JPEG does. An image is large if it has more than twice as many columns.
+A reduced image has the means of blocks of pixels, of two by two or of so many that at most
+`COLUMNS` columns are left: it is there to be looked at, and a map of 1920x1200 pixels takes twice
+the bytes of the camera's JPEG. An image is large if it has more than twice as many columns.
 
-What is the same on all frames (colours, class names, ranges) is a codec's ``style``, logged once.
-Rerun is imported by ``style`` and ``columns`` alone: decoding does not need it.
+A codec's ``style`` is logged once: colours, class names and ranges, the same on all frames. Only
+``style`` and ``columns`` import Rerun: decoding does not need it.
 
 A label image has 1, 2, 4 or 8 bits a pixel: the value of a pixel is its index, the palette only
-colours it. A binary mask of a real frame takes a quarter of what its raw bytes take after LZ4.
-ISA-L takes a half to two thirds of zlib-ng's time, and a third of zlib's, for files of the same
-size; Pillow and OpenCV take longer still.
+colours it. A binary mask of a real frame takes a quarter of the size of its raw bytes after LZ4.
+For files of the same size ISA-L takes a half to two thirds of zlib-ng's time and a third of zlib's;
+Pillow and OpenCV take longer still.
 
 References
 ----------
@@ -51,11 +51,11 @@ from roadeval.recording.layout import CAMERA, GROUND, Layout
 
 Array = npt.NDArray[Any]
 JPEG_QUALITY: Final = 90
-"""Of camera images that the log does not hold as JPEG or PNG, and of layers that need not be exact,
-which are also reduced."""
+"""Quality of camera images that the log does not hold as JPEG or PNG, and of layers that need not
+be exact, which are also reduced."""
 
 COLUMNS: Final = 400
-"""Columns of what is reduced, at most."""
+"""Most columns of a reduced image."""
 
 _FIFTHS: Final = (np.rint(np.arange(256) / 5) * 5).astype(np.uint8)
 """Every level rounded to a multiple of five: fewer levels take fewer bytes."""
@@ -86,7 +86,7 @@ _CAMERA: Final = LayerSpec("camera", LayerKind.RGB, "Camera")
 class Codec:
     """Encodes and decodes images of one kind, and describes to the viewer how to show them.
 
-    This one is for the camera's images, JPEG or PNG as the log has them.
+    This class itself is for the camera's images, JPEG or PNG as the log has them.
     """
 
     width: int
@@ -96,7 +96,7 @@ class Codec:
     """The archetype and its component that hold the bytes."""
 
     def style(self) -> Sequence[Any]:
-        """Return the archetypes that are logged once for the entity: drawn below every mask."""
+        """Return the archetypes that are logged once: the image is drawn below every mask."""
         import rerun as rr
 
         return [rr.EncodedImage.from_fields(draw_order=-10)]
@@ -106,10 +106,10 @@ class Codec:
         return _jpeg(array)
 
     def fitted(self, array: Any) -> Array:
-        """Return an array of a frame of another size in that of the recording."""
+        """Return an array of a frame of another size in the recording's size."""
         pixels = array.pixels() if isinstance(array, Packed) else array
-        how = cv2.INTER_LINEAR if pixels.ndim == 3 else cv2.INTER_NEAREST
-        return np.asarray(cv2.resize(pixels, (self.width, self.height), interpolation=how))
+        method = cv2.INTER_LINEAR if pixels.ndim == 3 else cv2.INTER_NEAREST
+        return np.asarray(cv2.resize(pixels, (self.width, self.height), interpolation=method))
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return the viewer's columns of the bytes of many frames."""
@@ -142,12 +142,12 @@ class MaskCodec(Codec):
     def _tables(self) -> tuple[Array, Array]:
         """The classes' places in the palette by their values, and the reverse, ``(256,)`` each."""
         places, values = np.zeros((2, 256), np.uint8)
-        for place, each in enumerate(self.spec.classes):
-            places[each.value], values[place] = place, each.value
+        for place, label in enumerate(self.spec.classes):
+            places[label.value], values[place] = place, label.value
         return places, values
 
     def style(self) -> Sequence[Any]:
-        """Draw it above the camera's image."""
+        """Return the archetype of a mask: it is drawn above the camera's image."""
         import rerun as rr
 
         return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
@@ -175,10 +175,12 @@ class LabelCodec(Codec):
 
         classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in self.spec.classes]
         size, kind = (self.width, self.height), rr.ChannelDatatype.U8
-        form = rr.components.ImageFormat(*size, color_model=rr.ColorModel.L, channel_datatype=kind)
+        pixels = rr.components.ImageFormat(
+            *size, color_model=rr.ColorModel.L, channel_datatype=kind
+        )
         return [
             rr.AnnotationContext(classes),
-            rr.SegmentationImage.from_fields(format=form, opacity=1.0, draw_order=10),
+            rr.SegmentationImage.from_fields(format=pixels, opacity=1.0, draw_order=10),
         ]
 
     def encode(self, array: Array) -> bytes:
@@ -196,7 +198,7 @@ class ScalarCodec(Codec):
     component = "EncodedDepthImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """Return the colour map; to the viewer grey levels are fractions, in any unit."""
+        """Return the colour map; the viewer takes grey levels for fractions, in any unit."""
         import rerun as rr
 
         return [
@@ -249,7 +251,7 @@ def _jpeg(rgb: Array) -> bytes:
 
 
 def limits_for(width: int, height: int) -> Limits:
-    """Return the limits on an image's size: the recording's own size is always allowed."""
+    """Return the limits on an image's size, which always allow the recording's own size."""
     return Limits(max(MAX_PIXELS, width * height))
 
 
@@ -257,17 +259,17 @@ Bytes = npt.NDArray[np.uint8]
 
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _GREY, _COLOUR, _PALETTE = 0, 2, 3
-"""The kinds of pixels, as a file's head names them."""
+"""The kinds of pixels in a file's header."""
 
 _WINDOW_BITS: Final = 9
-"""Repetitions are looked for in the last 512 bytes only: on masks and on noise, one further back
-costs more bits for its distance than it saves."""
+"""Base-2 logarithm of the bytes in which repetitions are looked for: on masks and on noise, the
+distance of one further back costs more bits than it saves."""
 
 
 def encode_labels(labels: Bytes | Packed, palette: Sequence[ColourWithOpacity]) -> bytes:
     """Encode ``(H, W)`` uint8 labels, each below ``len(palette)``, as a PNG file.
 
-    Labels of two classes may be packed, or of another type: what is not 0 is of the second class.
+    Labels of two classes may be packed, or of another type: all but 0 are the second class.
     """
     bits = next(bits for bits in (1, 2, 4, 8) if len(palette) <= 1 << bits)
     pixels = labels.pixels() if isinstance(labels, Packed) else labels
@@ -290,7 +292,7 @@ def encode_levels(levels: Bytes) -> bytes:
 
 
 def compress(lines: Bytes) -> bytes:
-    """Pack ``(H, 1 + B)`` uint8, rows each after its filter's number, in zlib's format."""
+    """Compress ``(H, 1 + B)`` uint8 rows, each after its filter's number, in zlib's format."""
     return igzip_lib.compress(lines.data, 1, flag=igzip_lib.COMP_ZLIB, hist_bits=_WINDOW_BITS)
 
 

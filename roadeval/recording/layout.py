@@ -1,4 +1,4 @@
-"""The layout of a recording: what it holds, and the entity path of each thing in it."""
+"""The layout of a recording: its images, tables and numbers with their entity paths."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from roadeval.geometry.plan import Plan
 from roadeval.runtime.documents import read_json
 
 APPLICATION: Final = "roadeval"
-"""Name of this program in its recordings."""
+"""This program's name in its recordings."""
 FORMAT: Final = 3
 """Version of the format. Only this one is read; a change that a reader must know of raises it."""
 
@@ -43,36 +43,34 @@ STAMP: Final = "stamp"
 LOG_TIME: Final = "message_log_time"
 HEADER_TIME: Final = "ros2_timestamp"
 FOXGLOVE_TIME: Final = "timestamp"
-"""The names of timelines in recordings that Rerun itself makes of MCAP files: the log time, and the
-header stamp of ROS's and of Foxglove's messages. With them both recordings are in step in one
-viewer."""
+"""Timelines of the log time and of the header stamp, as Rerun names them when it reads an MCAP file
+with ROS's or Foxglove's messages: one viewer shows both recordings in step."""
 
 CAMERA: Final = "/camera"
 TRUTH_PATH: Final = "/truth"
 TRUE_SHADOW: Final = "/true_shadow"
 GROUND: Final = "/ground"
-"""The camera's image as the ground looks from above; below it the truth, and each variant's errors.
-"""
+"""The camera's image seen from above; below this path lie the truth and each variant's errors."""
 CELL: Final = 0.16
-"""Metres of a cell's side there."""
+"""Side of a cell of the ground seen from above, in metres."""
 NOTES: Final = "/notes"
 GUIDE: Final = "/results/guide"
 LAYOUT: Final = "/results/layout"
 SHOWN: Final = "/results/images"
-"""The frames that have images, each with its header stamp."""
+"""The frames that have images, with their header stamps."""
 CAMERAS: Final = "/results/cameras"
-"""Of a rig: where the entities of each camera begin, by its name, as JSON."""
+"""The prefix of the paths of each camera of a rig, by its name, as JSON."""
 SUMMARY: Final = "summary"
-"""The name of a result, the content of ``summary.json``."""
+"""The name of the result that holds the content of ``summary.json``."""
 SECONDS: Final = "/timing/summary"
 """The summary's seconds, which differ from run to run, as all timing does."""
 PROPERTIES: Final = "/__properties/roadeval"
-"""Where Rerun keeps a recording's properties."""
+"""The path of a recording's properties, as Rerun names it."""
 ROLE: Final = "/state/frame"
 COUNTS: Final = (*OUTCOMES, "N")
 """The order of the numbers under ``/counts``."""
 MOST_WAITING: Final = 128
-"""Most frames whose images and text wait to be written. A killed run loses them."""
+"""Most frames that wait to be written. A killed run loses their images and text."""
 
 
 class RecordingError(RoadevalError):
@@ -80,7 +78,7 @@ class RecordingError(RoadevalError):
 
 
 class SeveralCamerasError(RecordingError):
-    """A recording of several cameras, none of which was named."""
+    """No camera was named of a recording of several."""
 
     def __init__(self, path: object, cameras: Sequence[str]) -> None:
         names = ", ".join(cameras)
@@ -89,7 +87,7 @@ class SeveralCamerasError(RecordingError):
 
 
 class DamagedError(RecordingError):
-    """A part of a recording is not what was written."""
+    """A part of a recording differs from what was written."""
 
     def __init__(self, path: object, part: str) -> None:
         super().__init__(
@@ -100,39 +98,39 @@ class DamagedError(RecordingError):
 
 @dataclass(frozen=True)
 class Layout:
-    """What is known about a recording before its first frame."""
+    """The facts of a recording that hold before its first frame."""
 
     drive: str
     """Name of the log, for titles."""
     width: int
-    """Of every image, in pixels."""
     height: int
+    """Size of every image, in pixels."""
     variants: tuple[VariantLayout, ...]
     """The variants in the order in which they are shown, without the baseline."""
     rates: tuple[str, ...]
     """Names of the rates under ``/metrics``."""
     baseline: bool = True
-    """Whether the baseline is counted, too."""
+    """Whether the baseline is counted as well."""
     has_truth: bool = True
-    """Whether any frame has a truth of the road."""
+    """Whether any frame has truth of the road."""
     has_shadow_truth: bool = False
     first_frame: int | None = None
     """The first frame that can be evaluated, if known."""
     rate_hz: float | None = None
     """Frames a second, if known: the speed at which the viewer plays."""
     calibration: Calibration | None = None
-    """Of images of this size, where it is known."""
+    """Calibration for images of this size, if known."""
     ground: Ground | None = None
-    """Before the camera, where it is known."""
+    """Ground in front of the camera, if known."""
     extent: tuple[float, float, float] = (6, 46, 20)
-    """Metres ahead between which the ground is shown from above, and metres across."""
+    """Nearest and farthest metres ahead of the ground seen from above, and its metres across."""
     clouds: tuple[str, ...] = ()
-    """Topics of the log's point clouds. They are not recorded, but seen where Rerun's own loader of
-    the log puts them beside."""
+    """Topics of the log's point clouds: they are not recorded, but the viewer shows them if the log
+    itself is opened beside the recording."""
     header_time: str = HEADER_TIME
-    """The name of the header stamp's timeline in Rerun's own recording of the log."""
+    """Name of the header stamp's timeline in Rerun's own recording of the log."""
     tables: Mapping[str, str] = field(default_factory=dict)
-    """Header line of each table that grows with the frames, by the table's name."""
+    """Header lines of the tables that grow with the frames, by the table's name."""
     properties: Mapping[str, str | int | float] = field(default_factory=dict)
     """Provenance: versions, settings, hashes."""
 
@@ -145,7 +143,7 @@ class Layout:
                 )
 
     def images(self) -> Iterator[tuple[str, LayerSpec]]:
-        """Yield the entity path and description of every layer, truths and errors included."""
+        """Yield the entity path and description of every layer, truth and errors included."""
         if self.has_truth:
             yield TRUTH_PATH, TRUTH
         if self.has_shadow_truth:
@@ -157,14 +155,14 @@ class Layout:
                 yield f"/{variant.name}/{ERRORS.name}", ERRORS
 
     def plan(self) -> Plan | None:
-        """Return the ground as it is shown from above."""
+        """Return how the ground is seen from above; None where it is unknown."""
         return Plan(self.ground, *self.extent, CELL) if self.ground else None
 
     def from_above(self) -> Iterator[tuple[str, LayerSpec]]:
-        """Yield the entity path and description of what lies on the ground seen from above."""
+        """Yield the entity path and description of each layer of the ground seen from above."""
         if self.ground and self.has_truth:
             yield f"/ground/{TRUTH.name}", TRUTH
-            yield from ((f"/ground/{each.name}", ERRORS) for each in self.variants)
+            yield from ((f"/ground/{variant.name}", ERRORS) for variant in self.variants)
 
     def scored(self) -> Iterator[tuple[str, str]]:
         """Yield the variant and stage of every counted mask, the baseline last."""
@@ -192,20 +190,20 @@ SHADOW_TRUTH: Final = LayerSpec(
 
 
 def prefixes(cameras: Iterable[str]) -> dict[str, str]:
-    """Return the path below which all entities of each camera lie, by the cameras' names.
+    """Return the prefix of the paths of each camera's entities, by the cameras' names.
 
-    It is empty for a camera without a name, the only one of its drive.
+    It is empty for a camera without a name, which is the only one of its drive.
 
     >>> prefixes(["/left/image raw", "front", ""])
     {'/left/image raw': '/left/image_raw', 'front': '/front', '': ''}
     """
-    found: dict[str, str] = {}
+    paths: dict[str, str] = {}
     for name in cameras:
         path = "".join(f"/{as_plain(part)}" for part in name.split("/") if part)
-        while path and path in found.values():
+        while path and path in paths.values():
             path += "_"
-        found[name] = path
-    return found
+        paths[name] = path
+    return paths
 
 
 _RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")
@@ -213,16 +211,15 @@ _RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")
 
 @dataclass(frozen=True)
 class RecordRule:
-    """The setting ``output.record``. Numbers, notes and tables of all frames are always recorded.
+    """The setting ``output.record``. It concerns images: all else is recorded of every frame.
 
     >>> RecordRule.parse("worst:20")
     RecordRule(kind='worst', number=20)
     """
 
     kind: str = "all"
-    """Of which frames all images are kept: ``all``, the ``worst`` (with the highest ERR), ``every``
-    N-th one. Of ``masks`` those of every frame, with the camera's image; ``none`` records nothing.
-    """
+    """Frames with images: ``all``, the ``worst`` (with the highest ERR), or ``every`` N-th one.
+    ``masks`` records masks and the camera's image of every frame; ``none`` makes no recording."""
     number: int = 0
     """K of ``worst:K``, N of ``every:N``."""
 
@@ -233,7 +230,7 @@ class RecordRule:
 
     @classmethod
     def parse(cls, text: str) -> RecordRule:
-        """Read a rule from the text of a setting; a `RecordingError` if it is not a rule."""
+        """Return the rule that a text states; a `RecordingError` if it states none."""
         match = _RULE.fullmatch(text)
         if match is None:
             raise RecordingError(

@@ -1,9 +1,8 @@
-"""Writes a recording while frames arrive. It can be opened in any state that a run leaves."""
+"""The recorder: it writes a recording while frames arrive, which a viewer can open at any time."""
 
 from __future__ import annotations
 
 import atexit
-import ctypes
 import errno
 import hashlib
 import heapq
@@ -15,8 +14,10 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import wait
 from contextlib import suppress
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
+from threading import Event
 from typing import Any, Final, NamedTuple, Self
 
 import rerun as rr
@@ -52,19 +53,19 @@ class EncodedFrame(NamedTuple):
 
     when: When
     camera: str
-    """Below which path all its entities lie, see `roadeval.recording.layout.prefixes`."""
+    """The prefix of its entities' paths, see `roadeval.recording.layout.prefixes`."""
     payloads: Mapping[str, bytes]
     numbers: Mapping[str, tuple[float, ...]]
     states: Mapping[str, str]
-    """Every state, empty if undefined."""
+    """All states, empty where undefined."""
     notes: tuple[tuple[str, str], ...]
-    """Sentences, each with its level."""
+    """Sentences with their levels."""
     error: float
-    """By what frames are ranked, see `worst_error`."""
+    """The value that ranks frames, see `worst_error`."""
 
     @property
     def size(self) -> int:
-        """Bytes of its images."""
+        """Size of its images in bytes."""
         return sum(map(len, self.payloads.values()))
 
 
@@ -72,36 +73,36 @@ class _Camera(NamedTuple):
     """A camera of the recording, perhaps its only one."""
 
     prefix: str
-    """Begins the paths of its entities."""
+    """The beginning of its entities' paths."""
     layout: Layout
     codecs: Mapping[str, Codec]
-    """By paths without the prefix."""
+    """Codecs by paths without the prefix."""
     plan: Plan | None
-    """The ground as it is shown from above, where it is known."""
+    """The ground seen from above, if known."""
 
 
-def _payloads(
+def _encode_images(
     result: FrameResult, camera: _Camera, kinds: Collection[LayerKind]
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the images of a frame by entity path; of its layers those of some kinds."""
+    """Yield the encoded images of a frame by entity path; layers only of these kinds."""
     frame, size = result.frame, (camera.layout.height, camera.layout.width)
-    # The viewer takes images for a video, whose size must not change.
+    # The viewer treats images as a video, so their size must not change.
     is_odd = any(0 != a != b for a, b in zip(size, frame.image.shape[:2], strict=True))
-    pictures = [*_pictures(result, camera.plan, kinds)]
+    images = [*_layer_images(result, camera.plan, kinds)]
     if frame.media_type in ("image/jpeg", "image/png") and not is_odd:
         yield at.CAMERA, bytes(frame.payload)
     else:
-        pictures.insert(0, (at.CAMERA, frame.image))
-    for path, picture in pictures:
-        if picture is not None:
+        images.insert(0, (at.CAMERA, frame.image))
+    for path, image in images:
+        if image is not None:
             codec = camera.codecs[path]
-            yield path, codec.encode(codec.fitted(picture) if is_odd else picture)
+            yield path, codec.encode(codec.fitted(image) if is_odd else image)
 
 
-def _pictures(
+def _layer_images(
     result: FrameResult, plan: Plan | None, kinds: Collection[LayerKind]
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the arrays beside the camera's image, as they are and as they look from above."""
+    """Yield truth, layers and errors by entity path, and images of the ground seen from above."""
     frame, errors = result.frame, {n: layer.array for n, layer in result.errors.items()}
     yield from ((at.TRUTH_PATH, frame.truth), (at.TRUE_SHADOW, frame.shadow_truth))
     for variant in result.variants:
@@ -121,7 +122,7 @@ def _pictures(
 def _numbers(
     result: FrameResult, rates: Collection[str]
 ) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield rates that are defined, counts, milliseconds and facts by entity path."""
+    """Yield defined rates, counts, milliseconds and stages' facts by entity path."""
     for tally in result.tallies:
         mask = f"{tally.variant}/{tally.stage}"
         for rate, value in tally.rates.items():
@@ -139,32 +140,34 @@ def _numbers(
 def worst_error(result: FrameResult, layout: Layout) -> float:
     """Return the greatest error rate of any variant's final mask; -1 for a frame not evaluated.
 
-    Where no frame has truth it is how much the first variant's mask is in doubt.
+    Without truth it is the doubt in the first variant's mask.
     """
     if not layout.has_truth:
-        signs = [(each.entropy, each.disagreement) for each in result.doubts[:1]]
-        return next((sign for each in signs for sign in each if not math.isnan(sign)), -1.0)
+        signs = [
+            sign for doubt in result.doubts[:1] for sign in (doubt.entropy, doubt.disagreement)
+        ]
+        return next((sign for sign in signs if not math.isnan(sign)), -1.0)
     finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
     return max((t.rates[TESTED] for t in finals), default=-1.0)
 
 
 class WorstFrames:
-    """The images of the frames with the highest ERR, at most ``most`` and those that fit in `HELD`.
+    """Encoded images of the frames with the highest ERR: at most ``most``, in `HELD` bytes.
 
-    They are held as they are written, until the last frame is known.
+    They wait here until the last frame is known.
     """
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._bytes = 0
         self._heap: list[tuple[float, int, str, EncodedFrame]] = []
-        """ERR, minus the number, and the camera of each frame, the least first; and the frame with
-        its images alone."""
+        """Frames with their images alone, each after its ERR, minus its number, and its camera; the
+        least ERR first."""
         self.least = 0.0
-        """The least ERR that can still be among the worst; for any thread."""
+        """The least ERR that is still among the worst; any thread may read it."""
 
     def offer(self, encoded: EncodedFrame) -> None:
-        """Keep a frame's images if they are among the worst; of equals the earlier ones."""
+        """Keep a frame's images if it is among the worst; among equal frames the earlier ones."""
         bare = encoded._replace(numbers={}, states={}, notes=())
         heapq.heappush(self._heap, (encoded.error, -encoded.when[0], encoded.camera, bare))
         self._bytes += bare.size
@@ -173,9 +176,9 @@ class WorstFrames:
             self.least = self._heap[0][0] if self._heap else 0.0
 
     def take(self) -> Iterator[EncodedFrame]:
-        """Yield the frames in order, with their images alone, and forget each.
+        """Yield the frames in order, with their images alone, and forget them one by one.
 
-        After an interrupt it can be called again.
+        It can be called again after an interrupt.
         """
         self._heap.sort(key=itemgetter(1))
         while self._heap:
@@ -185,35 +188,35 @@ class WorstFrames:
 
 ALL: Final = RecordRule()
 Texts = Mapping[str, Mapping[str, str]]
-"""Results by their name, of each camera by its name."""
+"""Results by their names, by camera."""
 NO_TEXTS: Final[Texts] = {}
 NO_LINES: Final[Mapping[str, str]] = {}
 UNWRITTEN: Final = 4 << 20
-"""Bytes that may wait for Rerun's own thread to write them, which has no limit itself."""
+"""Most bytes that wait for Rerun's own thread to write them; Rerun itself has no limit."""
 
 LEAST_FREE: Final = 64 << 20
-"""Bytes that must stay free on the disk beside what waits. Checked before each chunk but the last,
-for which it is meant: the partial recording then ends whole."""
+"""Bytes that must stay free on the disk beside the rows that wait. They are checked before each
+chunk but the last: they are meant for it, so that the partial recording ends complete."""
 
 HELD: Final = 256 << 20
-"""Bytes of images of the worst frames that are held until the end."""
+"""Most bytes of images of the worst frames that wait until the end."""
 WORTH_SAYING: Final = 100_000_000
-"""Bytes of a recording whose expected size is said."""
+"""Bytes from which on the expected size of a recording is announced."""
 
 PATIENCE_S: Final = 30.0
-"""How long a disk is waited for that takes nothing."""
+"""Seconds to wait for a disk that writes nothing."""
 LOOK_S: Final = 0.5
-"""Between two looks at what a slow disk has taken."""
+"""Seconds between two looks at the size of the file on a slow disk."""
 
 
 class Recorder:
     """Writes one recording, under the name ``partial`` at first.
 
-    A context manager: after `finish` the recording takes its name at the end. Left by an exception
-    it closes the partial recording, which stays readable. ``path`` is the name of the complete
-    recording: a file of that name is replaced at the end only. ``rule`` says which images are kept,
-    any but ``none``; those of ``worst:K`` wait until the end. Of a rig there is a layout for each
-    camera, by its name.
+    It is a context manager: if `finish` was called, the recording takes its name when the block
+    ends. After an exception the partial recording is closed and stays readable. ``path`` is the
+    name of the complete recording: a file of that name is replaced at the end only. ``rule``, any
+    but ``none``, chooses the images to keep; those of ``worst:K`` wait until the end. A rig has a
+    layout for each camera, by its name.
     """
 
     def __init__(
@@ -227,18 +230,18 @@ class Recorder:
             name: _Camera(prefix, layouts[name], codecs_of(layouts[name]), layouts[name].plan())
             for name, prefix in at.prefixes(layouts).items()
         }
-        self._layouts = {each.prefix: each.layout for each in self._cameras.values()}
+        self._layouts = {camera.prefix: camera.layout for camera in self._cameras.values()}
         self._rule = rule
         self._columns = {
-            each.prefix + path: codec.columns
-            for each in self._cameras.values()
-            for path, codec in each.codecs.items()
+            camera.prefix + path: codec.columns
+            for camera in self._cameras.values()
+            for path, codec in camera.codecs.items()
         }
         header_time = next(iter(self._layouts.values())).header_time
         self._rows, self._numbers = (
             Batcher(limits, header_time) for limits in (IMAGES_AND_TEXT, NUMBERS)
         )
-        self._finished = self._failed = self._foretold = False
+        self._finished = self._failed = self._forecast_made = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._shown: dict[str, set[str]] = {}
@@ -257,9 +260,9 @@ class Recorder:
             layouts = self._layouts
             texts = "".join(prefix + layout.to_json() for prefix, layout in layouts.items())
             identity = hashlib.blake2b(texts.encode(), digest_size=16).hexdigest()
-            # Rerun 0.41 keeps two threads and the last data of a closed stream until its next
-            # `init`, which opens none here, and is not waited for if another file is stuck. No call
-            # frees those of a blueprint that was given to `save`.
+            # Rerun 0.41 keeps two threads and the last data of a closed stream until the next
+            # `init`. This `init` opens no stream, and is not waited for if another file is stuck.
+            # Nothing frees the threads of a blueprint that was given to `save`.
             wait([in_thread(lambda: rr.init(at.APPLICATION, init_logging=False))], LOOK_S)
             self._stream = stream = rr.RecordingStream(
                 at.APPLICATION, recording_id=identity, send_properties=False
@@ -269,13 +272,14 @@ class Recorder:
             first, *_ = layouts.values()
             stream.send_recording_name(first.drive)
             if "" not in layouts:
-                self._log_static(views.of_a_rig(at.prefixes(self._cameras), first))
+                self._log_static(views.before_a_rig(at.prefixes(self._cameras), first))
             names = short_names([*self._cameras])
-            for name, each in self._cameras.items():
-                static = views.before_the_first_frame(each.layout, each.codecs, names[name])
-                kept = ((p, a) for p, a in static if not each.prefix or p != at.PROPERTIES)
-                self._log_static(kept, each.prefix)
-        except BaseException:  # an interrupt, too; it holds no frame
+            for name, camera in self._cameras.items():
+                static = [*views.before_the_first_frame(camera.layout, camera.codecs, names[name])]
+                if camera.prefix:  # the properties of a rig are logged above
+                    static = [(path, data) for path, data in static if path != at.PROPERTIES]
+                self._log_static(static, camera.prefix)
+        except BaseException:  # also an interrupt; the file holds no frame yet
             self._file.discard()
             raise
         return self
@@ -295,12 +299,12 @@ class Recorder:
                 error.add_note(f"the partial recording is {self.partial}")
 
     def encode(self, result: FrameResult, position: int) -> EncodedFrame:
-        """Encode a frame; the heavy part of the work, in any thread.
+        """Encode a frame: the heavy part of the work, for any thread.
 
         ``position`` counts the frames read, from 0.
         """
-        own = self._cameras.get(result.frame.camera) or self._cameras[""]
-        frame, health, error = result.frame, result.health, worst_error(result, own.layout)
+        camera = self._cameras.get(result.frame.camera) or self._cameras[""]
+        frame, health, error = result.frame, result.health, worst_error(result, camera.layout)
         kinds: Collection[LayerKind] = tuple(LayerKind)
         match self._rule.kind:
             case "masks":
@@ -310,15 +314,16 @@ class Recorder:
             case "worst" if error < self._worst.least:
                 kinds = ()
         states = {at.ROLE: result.role.value}
-        states |= {f"/state/{v.name}": health.get(v.name, "") for v in own.layout.variants}
+        states |= {f"/state/{v.name}": health.get(v.name, "") for v in camera.layout.variants}
         level = "WARN" if set(health.values()) - {Health.OK} else "INFO"
-        payloads, numbers = _payloads(result, own, kinds), _numbers(result, own.layout.rates)
+        images = _encode_images(result, camera, kinds) if kinds else ()
+        numbers = _numbers(result, camera.layout.rates)
         return EncodedFrame(
             (frame.number, frame.stamp_ns, frame.log_time_ns),
-            own.prefix,
-            {own.prefix + path: each for path, each in payloads} if kinds else {},
-            {own.prefix + path: each for path, each in numbers},
-            {own.prefix + path: each for path, each in states.items()},
+            camera.prefix,
+            {camera.prefix + path: payload for path, payload in images},
+            {camera.prefix + path: values for path, values in numbers},
+            {camera.prefix + path: state for path, state in states.items()},
             tuple((note, level) for note in result.notes),
             error,
         )
@@ -326,9 +331,7 @@ class Recorder:
     def write(self, encoded: EncodedFrame, lines: Mapping[str, str] = NO_LINES) -> None:
         """Append a frame, with its lines of the tables in `Layout.tables`, by name.
 
-        Frames come in order, from one thread.
-
-        A `RecordingError` if the disk is full.
+        Frames come in order, from one thread. A `RecordingError` if the disk is full.
         """
         when, below = encoded.when, encoded.camera
         if below not in self._shown:
@@ -352,43 +355,43 @@ class Recorder:
             self._worst.offer(encoded)
 
     def forecast(self, encoded: EncodedFrame, frames: int) -> str:
-        """Return how large the recording of so many frames becomes, by its first with images.
+        """Return a sentence on the size of a recording of so many frames, from its first images.
 
-        Empty for any further one, and where it is small and fits.
+        It is empty for any further frame, and if the recording is small and fits.
         """
-        if self._foretold or not encoded.payloads:
+        if self._forecast_made or not encoded.payloads:
             return ""
-        self._foretold = True
+        self._forecast_made = True
         shown = {
             "worst": min(self._rule.number, frames),
             "every": math.ceil(frames / max(self._rule.number, 1)),
         }.get(self._rule.kind, frames)
         size, room = shown * encoded.size, self._room()
         if self._rule.kind == "worst" and size > HELD:
-            kept = f"{HELD >> 20} MiB of memory, about {HELD // encoded.size}"
+            memory = f"{HELD >> 20} MiB of memory, about {HELD // encoded.size}"
             fitting = "{output.record} worst:{} keeps those that fit in {}"
-            return Sentence(fitting, self._rule.number, kept)
-        said = f"the recording will take about {size / 1e6:.0f} MB"
+            return Sentence(fitting, self._rule.number, memory)
+        sentence = f"the recording will take about {size / 1e6:.0f} MB"
         if size > room:
             free = f"{(room + LEAST_FREE) / 1e6:.0f} MB are free"
             return Sentence(
                 "{}, and only {}: {output.record} masks or worst:50 takes less, or {output.save} "
                 "names a place on another disk",
-                said,
+                sentence,
                 free,
             )
-        return said if size > WORTH_SAYING else ""
+        return sentence if size > WORTH_SAYING else ""
 
     def _write_worst(self) -> None:
-        """Append the images put aside, in order; their frames' numbers are written already.
+        """Append the images of the worst frames in order; the frames' numbers are written already.
 
-        They are cleared right after their frame, so that no later frame shows them. After an
-        interrupt it may be called again.
+        They are cleared right after their frame, so that no later frame shows them. It can be
+        called again after an interrupt.
         """
         for encoded in self._worst.take():
-            before = self._blank.get(encoded.camera)
-            if before is not None and before.when[0] != encoded.when[0]:
-                self._add_images(before)
+            blank = self._blank.get(encoded.camera)
+            if blank is not None and blank.when[0] != encoded.when[0]:
+                self._add_images(blank)
             self._add_images(encoded)
             number, stamp_ns, log_time_ns = encoded.when
             after = number + 1, stamp_ns + 1, log_time_ns + 1
@@ -398,7 +401,7 @@ class Recorder:
             self._add_images(self._blank.popitem()[1])
 
     def flush(self) -> None:
-        """Write everything that waits, after the last frame, to free its memory.
+        """Write everything that waits after the last frame, to free its memory.
 
         A `RecordingError` if it cannot be written.
         """
@@ -415,25 +418,25 @@ class Recorder:
         """Add the results and close the file, which takes its name when the context ends.
 
         ``results`` are the texts to keep under ``/results`` by name, as ``summary`` (JSON) and
-        ``windows`` (CSV); of a rig there are those of each camera, too, by its name. A
-        `RecordingError` if the file lacks what was written to it, as on a full disk.
+        ``windows`` (CSV); ``by_camera`` has those of each camera of a rig. A `RecordingError` if
+        the file is incomplete, as on a full disk.
         """
-        for name, each in self._cameras.items():
+        for name, camera in self._cameras.items():
             texts = by_camera[name] if name else results
-            self._log_static(views.after_the_last_frame(each.layout, texts), each.prefix)
+            self._log_static(views.after_the_last_frame(camera.layout, texts), camera.prefix)
         if by_camera:
             self._log_static(views.after_a_rig(results))
         self.flush()
-        for each in self._cameras.values():
-            pictured = json.dumps(self._pictured[each.prefix])
-            self._log_static([(at.SHOWN, [rr.TextDocument(pictured)])], each.prefix)
+        for camera in self._cameras.values():
+            pictured = json.dumps(self._pictured[camera.prefix])
+            self._log_static([(at.SHOWN, [rr.TextDocument(pictured)])], camera.prefix)
         self._close()
         if indexed_messages(self.partial) < self._chunks:
             raise self._incomplete()
         self._finished = True
 
     def check_disk_space(self) -> None:
-        """Raise a `RecordingError` if the disk is full, or as good as full; by an ENOSPC."""
+        """Raise a `RecordingError`, caused by an ENOSPC, if the disk is full or nearly full."""
         if self._room() < self._rows.size:
             raise RecordingError(
                 f"{self.path}: cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must "
@@ -441,7 +444,7 @@ class Recorder:
             ) from _failure(errno.ENOSPC)
 
     def _room(self) -> float:
-        """Return the bytes beside `LEAST_FREE`; a place that is no disk, as /proc, has no end."""
+        """Return the free bytes beside `LEAST_FREE`; infinity where no disk is, as in /proc."""
         disk = shutil.disk_usage(self.partial.parent)
         return disk.free - LEAST_FREE if disk.total else math.inf
 
@@ -449,7 +452,7 @@ class Recorder:
         when, below = encoded.when, encoded.camera
         if below + at.CAMERA in encoded.payloads:
             self._pictured[below].append(when[:2])
-        # The viewer goes on showing an image until another comes, so a missing one is cleared.
+        # The viewer shows an image until the next one comes, so missing ones are cleared.
         missing = sorted(self._shown.get(below, set()) - encoded.payloads.keys())
         for path, payload in {**encoded.payloads, **dict.fromkeys(missing, NOTHING)}.items():
             self._rows[path, self._columns[path]].add(when, payload)
@@ -461,18 +464,18 @@ class Recorder:
             stream.log(below + path, *archetypes, static=True, strict=True)
 
     def _end_frame(self, batcher: Batcher) -> None:
-        """Write the rows that have waited long enough."""
-        due = batcher.end_frame()
-        for key in due:
+        """Write the rows that are due."""
+        due_keys = batcher.end_frame()
+        for key in due_keys:
             self.check_disk_space()
             self._send(batcher, key)
-        if due:
+        if due_keys:
             self._flush_stream()
 
     def _send(self, batcher: Batcher, key: Key) -> None:
         rows = batcher[key]
         self._open_stream().send_chunks(rows.chunk())
-        # Not before: if the run is interrupted above, the rows are still sent at the end.
+        # Only now: after an interrupt above, the rows are still sent at the end.
         del batcher[key]
         self._chunks += 1
         self._unwritten += rows.size
@@ -491,19 +494,19 @@ class Recorder:
         self._watch(self._open_stream().flush)
 
     def _watch(self, call: Callable[[], object]) -> None:
-        """Make a call that waits for Rerun's writer, which ends where the file cannot grow.
+        """Make a call that waits for Rerun's writer, which ends if the file cannot grow.
 
-        Rerun waits for it without end then, in such a call and when the process ends.
+        Rerun would then wait forever, in such a call and when the process ends.
         """
         answer, size, looks = in_thread(call), -1, 0
         while not wait([answer], LOOK_S).done and not self._refusal():
-            before, size = size, self._size()
-            looks = looks + 1 if size == before else 0
+            last_size, size = size, self._size()
+            looks = looks + 1 if size == last_size else 0
             if looks * LOOK_S >= PATIENCE_S:
                 break
         if not answer.done() or answer.exception():
             atexit.unregister(rr.rerun_shutdown)
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
+            in_thread(partial(_keep, self._stream))
             self._failed, self._stream = True, None
             raise self._incomplete()
 
@@ -511,10 +514,10 @@ class Recorder:
         return self.partial.stat().st_size if self.partial.exists() else 0
 
     def _refusal(self) -> OSError | None:
-        """Return the error with which one more byte is refused, as at a limit or a full quota."""
+        """Return the error that writing one more byte gives, as at a full quota; None if none."""
         if self._room() < self._rows.size:
             return _failure(errno.ENOSPC)
-        with suppress(ImportError):  # elsewhere than on POSIX there is no such limit
+        with suppress(ImportError):  # only POSIX has such a limit
             import resource
 
             limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
@@ -533,7 +536,7 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            with suppress(RecordingError):  # the disk may have no room for them
+            with suppress(RecordingError):  # the disk may have no room for the images
                 self._write_worst()
             self._send_all()
         finally:
@@ -548,8 +551,13 @@ class Recorder:
         return error
 
 
+def _keep(_stream: object) -> None:
+    """Keep a stream as long as the process lives: whoever frees it waits for its writer."""
+    Event().wait()
+
+
 def _failure(number: int) -> OSError:
-    """Return the error that Rerun has met, or would meet, and does not report."""
+    """Return the error that Rerun met, or would meet, and does not report."""
     return OSError(number, os.strerror(number))
 
 
@@ -582,5 +590,5 @@ class NullRecorder:
 def recorder_for(
     path: Path | None, layout: Layout | Mapping[str, Layout], rule: RecordRule
 ) -> Recorder | NullRecorder:
-    """Return a recorder that keeps images by a rule; without a path one that does nothing."""
+    """Return a recorder that keeps images by a rule; without a path it does nothing."""
     return NullRecorder() if path is None else Recorder(path, layout, rule)

@@ -1,10 +1,9 @@
-"""A recording read back: tables, images and notes, without the log."""
+"""A recording read back without the log: its tables, images and notes."""
 
 from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike
@@ -16,9 +15,9 @@ from roadeval.data.arrays import Plane
 from roadeval.data.result import Cells
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError, SeveralCamerasError
-from roadeval.recording.rrd_file import TEXT, RrdFile, whole
+from roadeval.recording.rrd_file import TEXT, RrdFile, name_damage
 from roadeval.results.facts import Facts, another_format
-from roadeval.results.tables import TableFacts, read_table
+from roadeval.results.tables import read_table
 from roadeval.runtime.documents import check_texts, read_json
 from roadeval.version import VERSION
 
@@ -32,30 +31,22 @@ _CAMERA: Final = "EncodedImage:blob"
 
 
 def rig_facts(path: Path) -> Facts | None:
-    """Return the facts of all cameras together; None if the run did not get there."""
+    """Return the facts of all cameras together; None if the run ended before."""
     text = RrdFile(path).document(f"/results/{at.SUMMARY}")
     return None if text is None else Facts.parse(text, path)
 
 
 def run_toml_in(path: Path) -> str | None:
-    """Return the configuration of a recording's run as TOML; None if the run ended before it."""
+    """Return the configuration of a recording's run as TOML; None if the run ended before."""
     return RrdFile(path).document("/results/run")
-
-
-def _cameras(file: RrdFile) -> dict[str, str]:
-    """Return the path below which each camera's entities lie, by its name."""
-    with whole(file.path, at.CAMERAS):
-        found = read_json(file.document(at.CAMERAS) or "{}")
-        return {str(name): str(prefix) for name, prefix in found.items()}
 
 
 class Recording:
     """A recording on disk, the ``.rrd`` file that a replay wrote.
 
-    A partial one, of a run that was interrupted or killed, is read as far as it goes: then
-    ``complete`` is False, and ``summary`` and tables may be empty. A `RecordingError` if it is
-    no recording by this program, or of another format, or one of several cameras of which
-    ``camera`` names none.
+    A partial recording, of a run that was interrupted or killed, is read as far as it goes: then
+    ``complete`` is False, and ``summary`` and tables may be empty. A `RecordingError` if another
+    program or format has made it, or if it is of several cameras and ``camera`` names none.
 
     Examples
     --------
@@ -69,9 +60,11 @@ class Recording:
     def __init__(self, path: str | PathLike[str], camera: str = "") -> None:
         self.path = Path(path)
         self._file = RrdFile(self.path)
-        with whole(self.path, at.PROPERTIES):
-            form = self._file.static(at.PROPERTIES, "format")
-        cameras = _cameras(self._file)
+        with name_damage(self.path, at.PROPERTIES):
+            number = self._file.static(at.PROPERTIES, "format")
+        with name_damage(self.path, at.CAMERAS):
+            prefixes = read_json(self._file.document(at.CAMERAS) or "{}")
+            cameras = {str(name): str(prefix) for name, prefix in prefixes.items()}
         if cameras and camera not in cameras:
             raise SeveralCamerasError(self.path, [*cameras])
         self._file.below = cameras.get(camera, "")
@@ -80,12 +73,12 @@ class Recording:
             lacking = f"holds no run, or its {self._file.below + at.LAYOUT} was dropped"
             ended = "the recording ends before its first frame"
             raise RecordingError(f"{self.path}: {lacking if self._file.indexed else ended}")
-        with whole(self.path, at.LAYOUT):
+        with name_damage(self.path, at.LAYOUT):
             version = read_json(text).get("properties", {}).get("version")
-            if form is None and version == VERSION:  # a filter of Rerun's dropped the properties
-                form = at.FORMAT
-            if form != at.FORMAT:
-                sentence = another_format(version, later=(form or 0) > at.FORMAT)
+            if number is None and version == VERSION:  # Rerun's filter drops the properties
+                number = at.FORMAT
+            if number != at.FORMAT:
+                sentence = another_format(version, later=(number or 0) > at.FORMAT)
                 raise RecordingError(f"{self.path}: {sentence}")
             self.layout = Layout.from_json(text)
 
@@ -96,7 +89,7 @@ class Recording:
 
     @property
     def variants(self) -> tuple[VariantLayout, ...]:
-        """The variants with their stages and layers; the baseline is none of them."""
+        """The variants with their stages and layers, without the baseline."""
         return self.layout.variants
 
     @property
@@ -108,7 +101,7 @@ class Recording:
     def stamps(self) -> dict[int, int]:
         """The header stamps of the frames that have images, in nanoseconds."""
         if (listed := self._file.document(at.SHOWN)) is not None:
-            with whole(self.path, at.SHOWN):
+            with name_damage(self.path, at.SHOWN):
                 shown = {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
             if not self._file.span(at.CAMERA).holds_all(shown):
                 raise RecordingError(
@@ -118,31 +111,31 @@ class Recording:
             return shown
         stamps: dict[int, int] = {}
         for batch in self._file.batches(at.CAMERA, _CAMERA, static=False):
-            frames, own = (batch.column(n).cast("int64").to_pylist() for n in (at.FRAME, at.STAMP))
-            stamps |= zip(frames, own, strict=True)
+            columns = (batch.column(name).cast("int64") for name in (at.FRAME, at.STAMP))
+            stamps |= zip(*(column.to_pylist() for column in columns), strict=True)
         return stamps
 
     @property
     def unsure(self) -> tuple[int, ...]:
-        """The last frames of a partial recording, which may lack some layers."""
+        """The last frames of a partial recording: some of their layers may be missing."""
         return () if self.complete else self.frame_numbers[-at.MOST_WAITING :]
 
     def result(self, name: str) -> str | None:
-        """Return the text of a result, as ``summary``; None if the run ended before it."""
+        """Return the text of a result, as ``summary``; None if the run ended before."""
         return self._file.document(f"/results/{name}")
 
     @cached_property
     def facts(self) -> Facts | None:
-        """The facts of the result; None if the run did not get there."""
+        """The facts of the result; None if the run ended before."""
         text = self.result(at.SUMMARY)
         facts = None if text is None else Facts.parse(text, self.path)
-        with whole(self.path, at.SECONDS):
+        with name_damage(self.path, at.SECONDS):
             seconds = read_json(self._file.document(at.SECONDS) or "{}")
         return replace(facts, seconds=seconds) if facts else None
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The content of ``summary.json``; empty if the run did not get there."""
+        """The content of ``summary.json``; empty if the run ended before."""
         return self.facts.as_dict() if self.facts else {}
 
     @cached_property
@@ -152,19 +145,12 @@ class Recording:
 
     def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table by its name, as ``oracles``; empty if the run has none."""
-        return read_table(name, self._text(name), self._stated)
-
-    @property
-    def _stated(self) -> Mapping[str, TableFacts] | None:
-        """Rows and checksums of the tables; None where there are no facts to state them."""
-        return self.facts.tables or None if self.facts else None
-
-    def _text(self, name: str) -> str:
-        """Return the text of a table; empty if the run counted none."""
-        if name not in self.layout.tables:
-            return self.result(name) or ""
-        lines = (line for _, line in self._file.rows(f"/results/{name}", TEXT))
-        return "".join((self.layout.tables[name].rstrip(), "\n", *lines))
+        if name in self.layout.tables:
+            lines = (line for _, line in self._file.rows(f"/results/{name}", TEXT))
+            text = "".join((self.layout.tables[name].rstrip(), "\n", *lines))
+        else:
+            text = self.result(name) or ""
+        return read_table(name, text, self.facts.tables or None if self.facts else None)
 
     def scalars(self, path: str) -> pd.Series[float]:
         """Return the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
@@ -188,8 +174,8 @@ class Recording:
     def layer(self, variant: str, name: str, frame: int) -> Cells:
         """Return a layer of a variant on a frame.
 
-        A `RecordingError` if there is no such layer, or not on this frame. A `DamagedError` if it
-        is not what was written.
+        A `RecordingError` if there is no such layer, or none on this frame. A `DamagedError` if it
+        differs from what was written.
 
         Returns
         -------
@@ -200,17 +186,17 @@ class Recording:
         return self._array(f"/{variant}/{name}", frame)
 
     def is_whole(self, frame: int, *, scored: bool) -> bool:
-        """Return whether a frame has its image and masks, and if it was scored truth and errors."""
+        """Return whether a frame has its image and masks, and if scored its truth and errors."""
         paths = [at.CAMERA, *[at.TRUTH_PATH] * scored]
         for variant in self.variants:
             names = (*variant.stages, *[ERRORS.name] * scored)
             paths += (f"/{variant.name}/{name}" for name in names)
-        found = (self._file.image(path, self._codecs[path].component, frame) for path in paths)
-        return all(each is not None for each in found)
+        images = (self._file.image(path, self._codecs[path].component, frame) for path in paths)
+        return all(image is not None for image in images)
 
     @cached_property
     def _codecs(self) -> dict[str, Codec]:
-        # Only here: what decodes pictures takes time to import, and tables are read without it.
+        # Imported here: image decoders take time to import, and tables need none.
         from roadeval.recording.codecs import codecs_of
 
         return codecs_of(self.layout)
@@ -220,17 +206,17 @@ class Recording:
         notes = defaultdict[int, list[str]](list)
         for frame, note in self._file.rows(at.NOTES, "TextLog:text"):
             notes[frame].append(note)
-        with whole(self.path, at.NOTES):
-            for own in notes.values():
-                check_texts(own)
-        return {frame: tuple(own) for frame, own in notes.items()}
+        with name_damage(self.path, at.NOTES):
+            for sentences in notes.values():
+                check_texts(sentences)
+        return {frame: tuple(sentences) for frame, sentences in notes.items()}
 
     def _array(self, path: str, frame: int) -> Cells:
         if path not in self._codecs:
-            known = ", ".join(sorted(self._codecs))
-            raise RecordingError(f"{self.path}: there is no {path}; there are {known}")
+            paths = ", ".join(sorted(self._codecs))
+            raise RecordingError(f"{self.path}: there is no {path}; there are {paths}")
         codec = self._codecs[path]
-        with whole(self.path, f"{path} on frame {frame}"):
+        with name_damage(self.path, f"{path} on frame {frame}"):
             payload = self._file.image(path, codec.component, frame)
             if payload is None:
                 raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")

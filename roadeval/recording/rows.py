@@ -1,11 +1,11 @@
 """Rows of an entity, gathered over frames and sent as one chunk.
 
 A chunk costs about 1.1 kB in the file, 0.1 ms, and 1.5 to 3 kB of memory until the end, because
-Rerun's index has a cell for every component of the recording in every chunk's row. A chunk a frame
-and entity would cost more than most of what it holds.
+Rerun's index has a cell for every component of the recording in every chunk's row. With a chunk for
+each frame and entity most chunks would cost more than their content.
 
 Rerun can batch by itself (`rerun.ChunkBatcherConfig`), but takes 2.7 ms a frame more on the demo,
-and bounds neither what a killed run loses nor the memory of what waits.
+and limits neither the rows that a killed run loses nor the memory of rows that wait.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ Key = tuple[str, Columns]
 """An entity's path, and the kind of its rows."""
 
 NOTHING: Final = None
-"""A row without a value: from there on the viewer shows nothing of the entity.
+"""A row without a value: from this frame on the viewer shows nothing of the entity.
 
 `rerun.Clear` has no effect on encoded images: https://github.com/rerun-io/rerun/issues/12793.
 """
 
 CHUNK_BYTES: Final = 1 << 19
-"""Bytes of images and text at which a chunk is full: it is read whole, for one picture, too, and is
-held in memory several times while it is packed and written."""
+"""Bytes of images and text at which a chunk is full. All of it is read even for one picture, and it
+is held in memory several times while it is packed and written."""
 
 SHARE: Final = 8
-"""One frame in this many may wait, within `WaitLimits`."""
+"""The frames so far that it takes for another frame to wait, within `WaitLimits`."""
 
 
 @dataclass(frozen=True)
 class WaitLimits:
-    """For how many frames rows wait: a share of the frames so far, from ``least`` to ``most``.
+    """Limits on the number of frames for which rows wait: a share of the frames so far.
 
     A killed run loses the rows that wait.
     """
@@ -57,13 +57,13 @@ class WaitLimits:
 
 
 IMAGES_AND_TEXT: Final = WaitLimits(8, MOST_WAITING)
-"""Of images, notes, states and table lines."""
+"""Limits for images, notes, states and table lines."""
 NUMBERS: Final = WaitLimits(64, 1024)
-"""Of the graphs' numbers: many entities, a few bytes a frame each."""
+"""Limits for the graphs' numbers: many entities with a few bytes a frame each."""
 
 
 class PendingRows:
-    """The rows of one entity that wait."""
+    """Rows of one entity that wait to be sent."""
 
     def __init__(self, path: str, columns: Columns, header_time: str = HEADER_TIME) -> None:
         self._path, self._columns, self._header_time = path, columns, header_time
@@ -71,7 +71,7 @@ class PendingRows:
         self.size = 0
 
     def add(self, when: When, value: Any) -> None:
-        """Append a row of a frame, perhaps with `NOTHING`."""
+        """Append a row of a frame; its value may be `NOTHING`."""
         self._rows.append((when, value))
         self.size += _size(value)
 
@@ -80,18 +80,18 @@ class PendingRows:
         whens, values = zip(*self._rows, strict=True)
         frames, stamps, logged = np.array(whens).T
         named = zip((STAMP, self._header_time, LOG_TIME), (stamps, stamps, logged), strict=True)
-        times = [
+        timelines = [
             rr.TimeColumn(FRAME, sequence=frames),
-            *(rr.TimeColumn(n, timestamp=own.astype("datetime64[ns]")) for n, own in named),
+            *(rr.TimeColumn(n, timestamp=times.astype("datetime64[ns]")) for n, times in named),
         ]
         columns = self._columns([value for value in values if value is not NOTHING])
         if NOTHING in values:
             columns = columns.partition([int(value is not NOTHING) for value in values])
-        return Chunk.from_columns(self._path, times, columns)
+        return Chunk.from_columns(self._path, timelines, columns)
 
 
 class Batcher(dict[Key, PendingRows]):
-    """The rows of entities with the same `WaitLimits`: due together, or one entity's when full."""
+    """Rows of entities with the same `WaitLimits`: due together, or those of one when full."""
 
     def __init__(self, limits: WaitLimits, header_time: str = HEADER_TIME) -> None:
         super().__init__()
@@ -108,7 +108,7 @@ class Batcher(dict[Key, PendingRows]):
         return sum(rows.size for rows in self.values())
 
     def end_frame(self) -> list[Key]:
-        """Count a frame; return the keys of rows that are due."""
+        """Count a frame; return the keys of the rows that must now be sent."""
         self._frames += 1
         if self._frames - self._due >= self._limits.after(self._frames):
             self._due = self._frames
@@ -117,20 +117,20 @@ class Batcher(dict[Key, PendingRows]):
 
 
 def _size(value: Any) -> int:
-    """Return the bytes of an image, the letters of a text or of a note's two; 0 of a number."""
+    """Return the size of an image or of texts, in bytes or letters; 0 for a number."""
     if isinstance(value, tuple):
         return sum(map(_size, value))
     return len(value) if isinstance(value, bytes | str) else 0
 
 
 def numbers(values: list[tuple[float, ...]]) -> Any:
-    """Return columns of one number a row, or of several, as those of `layout.COUNTS`."""
+    """Return columns with one number a row, or with several as `layout.COUNTS` has them."""
     flat = np.array(values, np.float64)
     return rr.Scalars.columns(scalars=flat.ravel()).partition([flat.shape[1]] * len(flat))
 
 
 def states(values: list[str]) -> Any:
-    """Return columns that begin a state a row, or end one with an empty text."""
+    """Return columns of states that begin, one a row; an empty text ends a state."""
     return rr.StateChange.columns(state=values)
 
 

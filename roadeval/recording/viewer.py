@@ -24,11 +24,11 @@ from roadeval.recording.layout import RecordingError
 from roadeval.runtime import files
 
 SIZE: Final = (1920, 1080)
-"""Of a screenshot, in pixels; the recording's views are arranged for it."""
+"""Size of a screenshot in pixels; the recording's views are arranged for it."""
 PACKAGE: Final = "mesa-vulkan-drivers"
-"""Debian's package with the driver that draws without a graphics card."""
+"""The Debian package of the driver that draws without a graphics card."""
 DRIVERS: Final = Path("/usr/share/vulkan/icd.d")
-_LOADING_S: Final = 120.0
+LOADING_S: Final = 120.0
 _SETTLING_S: Final = 2.0
 """Seconds to wait for a recording, and for the drawing: after a jump images are decoded first."""
 _POLL_S: Final = 0.25
@@ -39,16 +39,16 @@ Answer = TypeVar("Answer")
 def show(recording: Path, frame: int | None = None) -> None:
     """Open a recording in the viewer, paused at a frame, and wait until its window is closed.
 
-    Without a frame it opens where the recording itself wants to begin. A `RecordingError` if there
-    is no screen, or the viewer does not come up.
+    Without a frame the recording's own arrangement decides. A `RecordingError` if there is no
+    screen, or the viewer does not start.
     """
     if not has_screen():
         raise RecordingError(
             f"No screen to open a window on: open {recording} on a machine that has one, or "
             "take a screenshot."
         )
-    with opened(recording) as (process, client):
-        go(client, frame)
+    with open_viewer(recording) as (process, client):
+        go_to(client, frame)
         process.wait()
 
 
@@ -58,36 +58,40 @@ def has_screen() -> bool:
 
 
 def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:
-    """Write what the viewer's window shows as a PNG file, without a screen.
+    """Write a PNG file of the viewer's window, without a screen; return the frame that it reports.
 
-    Returned is the frame that the viewer shows, as it reports itself. A `RecordingError` if there
-    is no graphics driver that works without a screen, the viewer does not draw, or the picture
-    cannot be written.
+    A `RecordingError` if there is no graphics driver that works without a screen, the viewer does
+    not draw, or the picture cannot be written.
     """
     width, height = SIZE
     options = ["--headless", "--window-size", f"{width}x{height}"]
     # The viewer reads a user's own settings from these folders; a screenshot has none.
     with tempfile.TemporaryDirectory() as home:
-        surroundings = {**_driver(), "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
-        with opened(recording, options, **surroundings) as (_, client):
-            shown = go(client, frame)
+        environment = {**_driver(), "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
+        with open_viewer(recording, options, **environment) as (_, client):
+            shown = go_to(client, frame)
             time.sleep(_SETTLING_S)
-            png = asked(client.take_screenshot)
+            png = ask(client.take_screenshot)
     with files.writing(picture, RecordingError):
         files.put(picture, png)
     return shown
 
 
 @contextmanager
-def opened(
+def open_viewer(
     recording: Path, options: Sequence[str] = (), **environment: str
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Start the viewer on a recording; it ends with the block."""
-    port = _free_port()
+    with socket.socket() as probe:  # the system chooses a free port
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    # The program itself: the command on ``PATH`` is a wrapper, which would leave it running.
+    folder = Path(rerun_cli.__file__).parent
+    program = next(path for path in (folder / "rerun", folder / "rerun.exe") if path.exists())
     address = ["--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(
-            [_program(), *address, *options, str(recording)],
+            [str(program), *address, *options, str(recording)],
             stdout=log,
             stderr=log,
             # With CI set the viewer sends no usage statistics.
@@ -101,8 +105,8 @@ def opened(
 
 
 def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerClient:
-    """Wait until the viewer has the whole recording."""
-    deadline = time.monotonic() + _LOADING_S
+    """Return a client of the viewer as soon as it has the whole recording."""
+    deadline = time.monotonic() + LOADING_S
     while time.monotonic() < deadline:
         if process.poll() is not None:
             raise RecordingError(f"the viewer did not start: {_reason(log)}")
@@ -111,41 +115,41 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
             state = client.get_state()
         except (OSError, RuntimeError):
             state = None
-        if state and not state.loading and any(each.timelines for each in state.recordings):
+        if state and not state.loading and any(shown.timelines for shown in state.recordings):
             return client
         time.sleep(_POLL_S)
-    raise RecordingError(f"the viewer did not load the recording within {_LOADING_S:.0f} s")
+    raise RecordingError(f"the viewer did not load the recording within {LOADING_S:.0f} s")
 
 
-def asked(ask: Callable[[], Answer]) -> Answer:
+def ask(request: Callable[[], Answer]) -> Answer:
     """Return the viewer's answer to a request, which is repeated after a timeout.
 
     Rerun's own timeout is 15 seconds, in which a busy machine may not have drawn once. A
     `RecordingError` if it does not answer in time, or has ended.
     """
-    deadline = time.monotonic() + _LOADING_S
+    deadline = time.monotonic() + LOADING_S
     while True:
         try:
-            return ask()
+            return request()
         except TimeoutError as error:
             if time.monotonic() > deadline:
                 raise RecordingError(
-                    f"the viewer did not answer within {_LOADING_S:.0f} s"
+                    f"the viewer did not answer within {LOADING_S:.0f} s"
                 ) from error
         except (OSError, RuntimeError) as error:
             raise RecordingError(f"the viewer has ended: {error}") from error
 
 
-def go(client: ViewerClient, frame: int | None) -> int | None:
+def go_to(client: ViewerClient, frame: int | None) -> int | None:
     """Move the viewer to a frame; return the frame that it then reports.
 
-    A `RecordingError` if it does not answer, see `asked`.
+    A `RecordingError` if it does not answer, see `ask`.
     """
     if frame is not None:
-        asked(lambda: client.set_time(at.FRAME, sequence=frame, play_state="paused"))
+        ask(lambda: client.set_time(at.FRAME, sequence=frame, play_state="paused"))
     deadline = time.monotonic() + _SETTLING_S
     while True:
-        shown = asked(client.get_state).recordings[0]
+        shown = ask(client.get_state).recordings[0]
         reached = shown.current_time if shown.current_timeline == at.FRAME else None
         if frame in (None, reached) or time.monotonic() > deadline:
             return reached
@@ -153,29 +157,16 @@ def go(client: ViewerClient, frame: int | None) -> int | None:
 
 
 def _driver() -> dict[str, str]:
-    """Return the variables that choose the software driver, which draws the same everywhere."""
+    """Return the variables that choose the software driver: it draws the same everywhere."""
     if "VK_ICD_FILENAMES" in os.environ or os.name != "posix":
         return {}
-    found = sorted(DRIVERS.glob("lvp_icd*.json"))
-    if not found:
+    drivers = sorted(DRIVERS.glob("lvp_icd*.json"))
+    if not drivers:
         raise RecordingError(
             "no graphics driver that draws without a screen; on Debian or Ubuntu: "
             f"apt-get install {PACKAGE}"
         )
-    return {"VK_ICD_FILENAMES": str(found[0])}
-
-
-def _program() -> str:
-    """Return the viewer's own path: the command on ``PATH`` is a wrapper that leaves it running."""
-    folder = Path(rerun_cli.__file__).parent
-    return str(next(path for path in (folder / "rerun", folder / "rerun.exe") if path.exists()))
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    return {"VK_ICD_FILENAMES": str(drivers[0])}
 
 
 def _reason(log: int) -> str:

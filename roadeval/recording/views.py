@@ -1,9 +1,9 @@
-"""What the viewer shows beside the frames: its blueprint, colours, names and documents.
+"""The arrangement of the viewer: its blueprint, colours, names and documents.
 
-The first tab is an overview that fits a screen of 1920x1080. From top to bottom: what the camera
-saw and what went wrong; a row a variant with its phases from left to right, equal phases below each
-other; the rates over time, how each frame went and what was noted. Further tabs hold every layer
-and every number.
+The first tab is an overview that fits a screen of 1920x1080. From top to bottom: the camera's image
+and the errors; a row for each variant with its phases from left to right, equal phases below each
+other; the rates over time, the states of the frames, and notes. Further tabs hold every layer and
+every number.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ from roadeval.runtime.text import as_markdown
 BlueprintPart = Any
 """A view or a container of views."""
 _TOP, _ROW, _BOTTOM = 64, 44, 50
-"""Shares of the height that the overview's first row, a variant's row and its curves take."""
+"""Shares of the overview's height: its first row, a variant's row, and the curves."""
 _PICTURE, _HEADER = 100, 50
-"""Shares of the width of a row that each of its pictures takes, and its header at least."""
+"""Shares of a row's width: each picture, and at least its header."""
 _ROWS: Final = 2
-"""Most variants that have a row: more would leave every picture too small to read."""
+"""Most variants that have a row: with more every picture would be too small."""
 _ABREAST: Final = 3
 """Cameras side by side."""
 _OUTCOMES: Final = 4
-"""Most variants whose errors are at the top."""
+"""Most variants with a picture of errors at the top."""
 
 Cell = tuple[LayerSpec, ...]
 """Layers that share a picture."""
@@ -61,24 +61,24 @@ Cell = tuple[LayerSpec, ...]
 def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
     """Return the arrangement of a recording's views.
 
-    ``layouts`` are those of its cameras by the path below which each one's entities lie; of a
-    drive with one camera, by an empty path.
+    ``layouts`` are the cameras' layouts by the prefix of their entities' paths; the prefix is empty
+    for a drive with one camera.
     """
     if "" in layouts:
         tabs = _tabs(layouts[""])
     else:
         tabs = [_all_cameras(layouts)]
         names = short_names([*layouts])
-        for prefix, each in layouts.items():
-            parts = _tabs(each)
-            _below(prefix, parts, each.clouds)
+        for prefix, layout in layouts.items():
+            parts = _tabs(layout)
+            _add_prefix(prefix, parts, layout.clouds)
             tabs.append(rrb.Tabs(*parts, active_tab=0, name=names[prefix]))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        # Opens at the last frame: the first ones may be training frames, whose error maps are
-        # empty, and a blueprint cannot name a frame to open at.
+        # It opens at the last frame: the first ones may be training frames with empty error maps,
+        # and a blueprint cannot name a frame.
         rrb.TimePanel(
             state="collapsed",
             timeline=at.FRAME if "" in layouts else at.STAMP,
@@ -90,19 +90,20 @@ def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
     )
 
 
-def _below(prefix: str, parts: Sequence[BlueprintPart], beside: Sequence[str] = ()) -> None:
-    """Let views and containers show the entities below a path, as if they lay at the top.
+def _add_prefix(prefix: str, parts: Sequence[BlueprintPart], beside: Sequence[str] = ()) -> None:
+    """Add a camera's prefix to all paths of views and containers.
 
-    What lies ``beside`` all cameras stays where it is.
+    The paths ``beside`` the cameras' stay as they are.
     """
     for part in parts:
         if not isinstance(part, rrb.View):
-            _below(prefix, part.contents, beside)
+            _add_prefix(prefix, part.contents, beside)
             continue
         part.origin = prefix + (part.origin if part.origin != "/" else "")
         part.contents = [path if path in beside else prefix + path for path in part.contents]
-        own = part.visualizer_overrides
-        part.visualizer_overrides = {prefix + str(path): each for path, each in own.items()}
+        part.visualizer_overrides = {
+            prefix + str(path): visualizer for path, visualizer in part.visualizer_overrides.items()
+        }
 
 
 def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
@@ -111,10 +112,10 @@ def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
     for prefix, layout in layouts.items():
         view = outcome(layout, layout.variants[0])
         view.name = f"{names[prefix]}: {view.name}"
-        _below(prefix, [view])
+        _add_prefix(prefix, [view])
         pictures.append(view)
         variants = layout.variants[:_ROWS] if layout.has_truth else ()
-        paths += [f"{prefix}/metrics/{each.name}/{each.stages[-1]}/{TESTED}" for each in variants]
+        paths += [f"{prefix}/metrics/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
     curves = [plot(f"{TESTED} as a fraction, by camera", paths)] if paths else []
     below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
     grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
@@ -132,8 +133,7 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
         rates = [rate for rate in SHORT if rate in layout.rates]
         plots = []
         for stage, rate in product(dict.fromkeys(stage for _, stage in masks), rates):
-            own = [variant for variant, other in masks if other == stage]
-            paths = [f"/metrics/{variant}/{stage}/{rate}" for variant in own]
+            paths = [f"/metrics/{name}/{stage}/{rate}" for name, other in masks if other == stage]
             plots.append(plot(f"{rate} of {stage}", paths))
         tabs.append(rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage"))
         plots = [plot(f"{v}: pixels of {s}", [f"/counts/{v}/{s}"]) for v, s in masks]
@@ -157,7 +157,7 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
 
 def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
     """Return the ground in space, below the camera, and from above with each variant's errors."""
-    names = [each.name for each in layout.variants[:_OUTCOMES]] if layout.has_truth else []
+    names = [v.name for v in layout.variants[:_OUTCOMES]] if layout.has_truth else []
     shown = {"Truth: road": TRUTH.name} if layout.has_truth else {}
     shown |= {f"{name}: errors": name for name in names}
     flat = [picture(title, at.GROUND, f"/ground/{name}") for title, name in shown.items()]
@@ -176,7 +176,7 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
             look_target=(0, 2, (near + far) / 2.5),
             eye_up=(0, -1, 0),
         ),
-        # The camera's picture is on the ground, and of that no frame is shown.
+        # The camera's picture lies on the ground; the frustum of the ground's camera is not shown.
         overrides={
             at.CAMERA: rr.Pinhole.from_fields().visualizer(),
             at.GROUND: rr.EncodedImage.from_fields().visualizer(),
@@ -206,8 +206,8 @@ def overview(layout: Layout) -> BlueprintPart:
 def _cells(variant: VariantLayout) -> list[Cell]:
     """Return the layers, grouped into pictures.
 
-    An overlay joins the overlay before it, as rings join their shadow, unless it is a stage's
-    mask: each of those begins a picture of its own.
+    An overlay joins the overlay before it, as rings join their shadow, unless it is a stage's mask,
+    which begins a picture of its own.
     """
     cells: list[Cell] = []
     for spec in variant.layers:
@@ -222,9 +222,9 @@ def _cells(variant: VariantLayout) -> list[Cell]:
 def _row(
     variant: str, cells: Sequence[Cell], columns: int, aside: BlueprintPart | None
 ) -> BlueprintPart:
-    """Return a variant's row, filled from the right, so that equal phases are aligned.
+    """Return a variant's row, filled from the right so that equal phases are aligned.
 
-    What has its place beside a short row stands before the row's header, which parts the two.
+    The part ``aside`` stands to the left of a short row, before its header.
     """
     # Titles must be short here: the layers' names.
     pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
@@ -234,7 +234,7 @@ def _row(
 
 
 def _curves(layout: Layout) -> list[BlueprintPart]:
-    """Return graphs that compare the rates of the final masks, or without truth the times."""
+    """Return graphs of the final masks' rates, or without truth of the stages' times."""
     if not layout.has_truth:
         return [stage_times(variant) for variant in layout.variants[:_ROWS]]
     finals = [f"{variant.name}/{variant.stages[-1]}" for variant in layout.variants]
@@ -250,7 +250,7 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
 
 
 def picture(title: str, *paths: str) -> BlueprintPart:
-    """Return a view of images drawn over each other."""
+    """Return a view of images that lie over each other."""
     return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
 
 
@@ -260,12 +260,12 @@ def camera() -> BlueprintPart:
 
 
 def truth() -> BlueprintPart:
-    """Return a view of the truth: which pixels are road."""
+    """Return a view of the road's truth."""
     return picture("Truth: road", at.CAMERA, at.TRUTH_PATH)
 
 
 def outcome(layout: Layout, variant: VariantLayout) -> BlueprintPart:
-    """Return a view of the variant's errors, or without truth of what it calls road."""
+    """Return a view of the variant's errors, or without truth of its road mask."""
     what, name = ("errors", ERRORS.name) if layout.has_truth else ("road", variant.stages[-1])
     return picture(f"{variant.name}: {what}", at.CAMERA, f"/{variant.name}/{name}")
 
@@ -276,7 +276,7 @@ def is_overlay(spec: LayerSpec) -> bool:
 
 
 def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> BlueprintPart:
-    """Return one view of layers of a variant."""
+    """Return one view of several layers of a variant."""
     below = [at.CAMERA] if is_overlay(specs[0]) else []
     return picture(title, *below, *(f"/{variant}/{spec.name}" for spec in specs))
 
@@ -292,19 +292,19 @@ def plot(title: str, paths: Sequence[str]) -> BlueprintPart:
 
 
 def stage_times(variant: VariantLayout) -> BlueprintPart:
-    """Return a graph of how long each stage of a variant took."""
+    """Return a graph of the milliseconds that a variant's stages took."""
     return plot(f"{variant.name}: milliseconds a stage", [f"/timing/{variant.name}/**"])
 
 
 def document(path: str, title: str | None = None) -> BlueprintPart:
-    """Return a view of a text; without a title it has no title bar either."""
+    """Return a view of a text, with a title bar if it has a title."""
     return rrb.TextDocumentView(
         origin=path, contents=[path], name=title, titlebar=title is not None
     )
 
 
 def _events() -> BlueprintPart:
-    """Return, side by side, how frames were used with each variant's health, and the notes."""
+    """Return, side by side, the frames' roles with each variant's health, and the notes."""
     notes = rrb.TextLogView(
         origin=at.NOTES,
         contents=[at.NOTES],
@@ -317,7 +317,7 @@ def _events() -> BlueprintPart:
 
 
 StaticData = Iterator[tuple[str, list[Any]]]
-"""Entity paths, and the archetypes to log there."""
+"""Entity paths with the archetypes to log there."""
 
 _VARIANTS: Final[Mapping[str, Colour]] = {
     FILTERED: colours.FILTERED,
@@ -356,7 +356,7 @@ _CURVES: Final = """\
 image.
 """
 _NO_TRUTH: Final = """\
-The log has no truth for the road: there is nothing to score, only what was computed.
+The log has no truth for the road, so there are no errors and no rates.
 """
 _HANDLING: Final = """\
 **Space** plays. The tabs above hold every layer, every number and the results.
@@ -366,7 +366,7 @@ _HANDLING: Final = """\
 def before_the_first_frame(
     layout: Layout, codecs: Mapping[str, Codec], camera: str = ""
 ) -> StaticData:
-    """Yield what is known before the first frame; ``camera`` is its short name in a rig."""
+    """Yield the static data that a recording begins with; ``camera`` is its short name in a rig."""
     for path, codec in codecs.items():
         yield path, list(codec.style())
     if layout.calibration:
@@ -386,20 +386,20 @@ def before_the_first_frame(
     yield from _lines(layout, f"{camera} " if camera else "")
 
 
-def _lens(known: Calibration) -> Iterator[Any]:
-    """Yield the camera's pinhole, and its place where that is known.
+def _lens(calibration: Calibration) -> Iterator[Any]:
+    """Yield the camera's pinhole and, if known, its place.
 
-    By frames with names, as Rerun's own loader of MCAP files gives them: a pinhole of the entity
-    itself would take its pictures out of every two-dimensional view.
+    They belong to named coordinate frames, as in recordings that Rerun makes of MCAP files: a
+    pinhole of the entity itself would remove its pictures from every two-dimensional view.
     """
-    frame = _frame_of(known)
+    frame = _frame_of(calibration)
     yield rr.Pinhole(
-        image_from_camera=np.array(known.matrix).reshape(3, 3),
-        resolution=[known.width, known.height],
+        image_from_camera=np.array(calibration.matrix).reshape(3, 3),
+        resolution=[calibration.width, calibration.height],
         child_frame=f"{frame}_image_plane",
         parent_frame=frame,
     )
-    if (mounting := known.mounting) is not None:
+    if (mounting := calibration.mounting) is not None:
         yield rr.Transform3D(
             translation=mounting.translation,
             quaternion=mounting.rotation,
@@ -408,18 +408,19 @@ def _lens(known: Calibration) -> Iterator[Any]:
         )
 
 
-def _frame_of(known: Calibration) -> str:
-    return known.frame_id or at.CAMERA.strip("/")
+def _frame_of(calibration: Calibration) -> str:
+    """Return the name of a camera's coordinate frame."""
+    return calibration.frame_id or at.CAMERA.strip("/")
 
 
 _ABOVE: Final = 20.0
-"""Metres above the ground of a camera that looks straight down: its picture lies on the ground."""
+"""Height in metres of a camera that looks straight down: its picture lies on the ground."""
 _DOWN: Final = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-"""From its right, down and forward to ahead, left and up."""
+"""Rotation from this camera's right, down and forward to ahead, left and up."""
 
 
 def _plane(layout: Layout, ground: Ground) -> StaticData:
-    """Yield where the pictures of the ground lie in space: as those of a camera above it."""
+    """Yield the place of the ground's pictures in space: a camera above the ground has them."""
     frame = _frame_of(layout.calibration) if layout.calibration else at.CAMERA.strip("/")
     if ground.is_posed and layout.calibration:
         near, far, width = layout.extent
@@ -444,19 +445,20 @@ def _plane(layout: Layout, ground: Ground) -> StaticData:
         yield path, [rr.CoordinateFrame(f"{frame}_ground_image")]
 
 
-def of_a_rig(prefixes: Mapping[str, str], first: Layout) -> StaticData:
-    """Yield what is known of several cameras before the first frame.
+def before_a_rig(prefixes: Mapping[str, str], first: Layout) -> StaticData:
+    """Yield the static data that a recording of several cameras begins with.
 
-    ``prefixes`` are the paths below which their entities lie; ``first`` is one camera's layout.
+    ``prefixes`` begin the paths of each camera's entities; ``first`` is one camera's layout.
     """
-    own = {n: v for n, v in first.properties.items() if n not in ("image_topic", "truth_topic")}
-    yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **own, cameras=list(prefixes))]
+    topics = ("image_topic", "truth_topic")
+    shared = {name: value for name, value in first.properties.items() if name not in topics}
+    yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **shared, cameras=list(prefixes))]
     yield at.CAMERAS, [rr.TextDocument(json.dumps(prefixes))]
     yield _rig_guide(first.drive, prefixes)
 
 
 def after_a_rig(texts: Mapping[str, str]) -> StaticData:
-    """Yield what is known of several cameras after the last frame."""
+    """Yield the static data that a recording of several cameras ends with."""
     summary = json.loads(texts[at.SUMMARY])
     yield _rig_guide(summary["drive"]["name"], summary["cameras"], summary["verdict"])
     yield from _results(texts)
@@ -470,7 +472,7 @@ def _rig_guide(drive: str, cameras: Iterable[str], verdict: str = "") -> tuple[s
 
 
 def _lines(layout: Layout, camera: str) -> StaticData:
-    """Yield names and colours of the graphs of rates and counts; ``camera`` begins the names."""
+    """Yield the names and colours of graphs of rates and counts; ``camera`` begins the names."""
     extra = cycle(colours.EXTRA)
     names = [*(variant.name for variant in layout.variants), BASELINE]
     variants = {name: _VARIANTS.get(name) or next(extra) for name in names}
@@ -483,7 +485,7 @@ def _lines(layout: Layout, camera: str) -> StaticData:
 
 
 def timing_lines(paths: Iterable[str]) -> StaticData:
-    """Yield the colours of every stage that is timed, in the order in which they run."""
+    """Yield the colours of the graphs of stages' times, in the order in which stages run."""
     stages: dict[str, Colour] = {}
     for path in paths:
         if path.startswith("/timing/"):
@@ -493,16 +495,16 @@ def timing_lines(paths: Iterable[str]) -> StaticData:
 
 
 def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData:
-    """Yield what is known after the last frame.
+    """Yield the static data that a recording ends with.
 
-    The seconds that a run took are kept apart from its summary, among the timing: everything
-    else is the same when the same log is replayed again.
+    The seconds of a run lie apart from its summary, beside the timing: everything else is the same
+    when the same log is replayed again.
     """
     summary = json.loads(texts.get(at.SUMMARY, "{}"))
     yield from _guides(layout, summary)
     yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
-    kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
-    yield from _results({**texts, **kept})
+    timeless = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
+    yield from _results({**texts, **timeless})
 
 
 def _results(texts: Mapping[str, str]) -> StaticData:
@@ -518,22 +520,22 @@ def _line(name: str, colour: Colour) -> rr.SeriesLines:
 
 
 def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
-    """Yield the guide to the first tab and the rows' headers, by a summary if there is one yet.
+    """Yield the guide to the first tab and the rows' headers; ``summary`` is empty at first.
 
-    The guide begins with the verdict on the drive; a header has the variant's name and title, and
+    The guide begins with the verdict on the drive; a header has the variant's name, its title, and
     the rates of its final mask.
     """
     names = [as_markdown(variant.name) for variant in layout.variants]
     others = " and ".join(names[_ROWS:])
     rows = _ROW_GUIDE.format(
         rows=" and ".join(names[:_ROWS]),
-        others=f"Those of {others} have tabs of their own." if others else "",
+        others=f"Further tabs show the phases of {others}." if others else "",
     )
     parts = [_ERRORS, rows, _CURVES] if layout.has_truth else [_NO_TRUTH, rows]
     yield _guide(layout.drive, str(summary.get("verdict", "")), *parts, _HANDLING)
     for variant, name in zip(layout.variants, names, strict=True):
         rates = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
-        # A heading would break the name in a column as narrow as this one.
+        # A heading would break the name in such a narrow column.
         parts = [f"**{name}**", as_markdown(variant.title)]
         parts += [f"{rate} {percent(rates[rate])} %" for rate in SHORT if rate in rates]
         yield f"/results/guide/{variant.name}", [_markdown("\n\n".join(parts) + "\n")]

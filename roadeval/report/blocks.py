@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
 from roadeval.report.chart import Chart, legend
-from roadeval.report.drawing import drawn, span_of_frames
-from roadeval.runtime.text import as_markdown
+from roadeval.report.drawing import place_chart, range_of_frames
+from roadeval.runtime.text import as_markdown, visible
 
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
@@ -26,7 +26,7 @@ class ImageFile:
 
     @property
     def name(self) -> str:
-        """File name inside the document: equal files have equal names."""
+        """The file's name inside the document; equal files have equal names."""
         suffix = next(s for head, s in _SUFFIXES.items() if self.content.startswith(head))
         return f"{hashlib.blake2b(self.content, digest_size=8).hexdigest()}.{suffix}"
 
@@ -37,29 +37,34 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """Its name in templates, as ``heading``."""
+        """The block's name in templates, as ``heading``."""
         return type(self).__name__.lower()
 
     def as_json(self) -> dict[str, Any]:
-        """Return the block's kind and its fields as JSON has them; an image file by its name."""
+        """Return the block's kind and its fields for JSON; an image file is its name.
+
+        `roadeval.runtime.text.visible` is applied to every text.
+        """
         return {"kind": self.kind, **_fields(self)}
 
     def parts(self) -> Iterator[Any]:
-        """Yield the image files, the charts and the blocks inside, and what is inside of those."""
-        for each in fields(self):
-            yield from _parts(getattr(self, each.name))
+        """Yield all image files, charts and blocks that the block and its blocks hold."""
+        for part in fields(self):
+            yield from _parts(getattr(self, part.name))
 
     def images(self) -> Iterator[ImageFile]:
-        """Yield the image files in the block and in those it holds."""
+        """Yield all image files that the block and its blocks hold."""
         yield from (part for part in self.parts() if isinstance(part, ImageFile))
 
 
 def _fields(value: Any) -> dict[str, Any]:
-    return {each.name: _as_json(getattr(value, each.name)) for each in fields(value)}
+    return {part.name: _as_json(getattr(value, part.name)) for part in fields(value)}
 
 
 def _as_json(value: Any) -> Any:
     match value:
+        case str():
+            return visible(value)
         case ImageFile():
             return value.name
         case Block():
@@ -83,7 +88,7 @@ def _parts(value: Any) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Heading(Block):
-    """A heading; one of level 1 is numbered. All are in the outline."""
+    """A heading in the outline; headings of level 1 are numbered."""
 
     text: str
     level: int = 1
@@ -122,7 +127,7 @@ class Cell(Block):
     text: str
     bold: bool = False
     dot: str | None = None
-    """The colour of a dot before the text."""
+    """Colour of a dot before the text."""
 
 
 @dataclass(frozen=True)
@@ -130,25 +135,25 @@ class Table(Block):
     """A table."""
 
     columns: Sequence[str]
-    """Titles."""
+    """Titles of the columns."""
     rows: Sequence[Sequence[Cell | str]]
-    """As many cells each as there are columns."""
+    """Rows with a cell for each column."""
     text_columns: Sequence[int] = (0,)
     """Positions of the columns of words, which are aligned left; numbers are aligned right."""
     breaks: Sequence[int] = ()
-    """Rows above which a thin rule is drawn."""
+    """Rows with a thin rule above them."""
     groups: Sequence[tuple[str, int]] = ()
-    """Titles above several columns, each with its number of columns; together all columns."""
+    """Titles above several columns, with their numbers of columns; together all columns."""
     caption: str = ""
-    """Printed above the table."""
+    """The text above the table."""
     small: bool = False
     """Whether it is set in small type."""
     find: str = ""
-    """On a page: what stands before a field that looks for words in a table of many rows."""
+    """The label of a field on a page that searches words in a table of many rows."""
 
 
-def markdown(blocks: Iterable[Block]) -> str:
-    """Return headings, texts, lists and tables as Markdown; other blocks are left out."""
+def blocks_as_markdown(blocks: Iterable[Block]) -> str:
+    """Return headings, texts, lists and tables as Markdown, without other blocks."""
     lines: list[str] = []
     for block in blocks:
         match block:
@@ -184,33 +189,34 @@ class Figure(Block):
     caption: str
 
     def as_json(self) -> dict[str, Any]:
-        """Return what paper needs to draw it."""
-        span, keys = span_of_frames(self.charts), legend(self.charts)
+        """Return the placed charts and their legend."""
+        frames, entries = range_of_frames(self.charts), legend(self.charts)
         titles = "; ".join(f"{chart.title}, {chart.unit}" for chart in self.charts)
+        names = ", ".join(entry.name for entry in entries)
         return {
             "kind": self.kind,
-            "caption": self.caption,
-            "alt": f"{titles}: {', '.join(key.name for key in keys)}".rstrip(": "),
-            "legend": _as_json(keys),
-            "charts": _as_json([drawn(chart, span) for chart in self.charts]),
+            "caption": visible(self.caption),
+            "alt": visible(f"{titles}: {names}".rstrip(": ")),
+            "legend": _as_json(entries),
+            "charts": _as_json([place_chart(chart, frames) for chart in self.charts]),
         }
 
 
 @dataclass(frozen=True)
 class ImageGrid(Block):
-    """Pictures of equal size in rows, each with a few words below it."""
+    """Pictures of equal size in rows, with a few words below each picture."""
 
     pictures: Sequence[tuple[str, ImageFile]]
     columns: int
     skip: int = 0
-    """Places of the first row that stay free, on paper."""
+    """Places of the first row that stay free on paper."""
     caption: str = ""
-    """Printed below all of them."""
+    """The text below all pictures."""
 
 
 @dataclass(frozen=True)
 class KeepTogether(Block):
-    """Blocks with no page break between them."""
+    """Blocks without a page break between them."""
 
     blocks: Sequence[Block]
 
@@ -222,12 +228,12 @@ class Details(Block):
     title: str
     blocks: Sequence[Block]
     on_paper: bool = True
-    """Whether paper has them, below their title as a heading."""
+    """Whether paper shows them, below their title as a heading."""
 
 
 @dataclass(frozen=True)
 class TwoColumns(Block):
-    """Two stacks of blocks side by side; the left one takes ``share`` of the width."""
+    """Two stacks of blocks side by side; the left stack takes ``share`` of the width."""
 
     left: Sequence[Block]
     right: Sequence[Block]
@@ -236,28 +242,28 @@ class TwoColumns(Block):
 
 @dataclass(frozen=True)
 class TableOfContents(Block):
-    """The document's headings with their pages: of the first level, or down to a depth."""
+    """The document's headings with their pages, down to a level."""
 
     depth: int = 1
 
 
 @dataclass(frozen=True)
-class Document(Block):
-    """A document."""
+class Report(Block):
+    """A report: a title and blocks."""
 
-    kicker: str
-    """The line above the title."""
     title: str
     subtitle: str
     """The line below the title."""
-    footer: str
-    """Printed at the foot of every page."""
     blocks: Sequence[Block]
+    kicker: str
+    """The line above the title."""
+    footer: str
+    """The line at the foot of every page."""
     keywords: Sequence[str] = ()
-    """Of the file."""
+    """Keywords of the file."""
 
     def files(self) -> Mapping[str, bytes]:
-        """Return every image file's bytes by its name."""
+        """Return the bytes of every image file by its name."""
         return {image.name: image.content for image in self.images()}
 
 
@@ -266,9 +272,9 @@ class Picture(Block):
     """A picture of a strip."""
 
     name: str
-    """The same in every frame, as ``filtered: errors``: kept when the frame changes."""
+    """The same name in every frame, as ``filtered: errors``: another frame shows its picture."""
     title: str
-    """What it shows, in a few words."""
+    """A few words on its content."""
     image: ImageFile
 
 
@@ -278,19 +284,18 @@ class Strip(Block):
 
     frame: int
     sentences: Sequence[str]
-    """What is known of it."""
     rates: Table | None
-    """Of each variant's final mask; None without truth."""
+    """Rates of each variant's final mask; None without truth."""
     rows: Sequence[Sequence[Picture]]
-    """The outcomes, then the layers of each variant."""
+    """Pictures of the outcomes, then of the layers of each variant."""
     command: str = ""
-    """Opens it in the viewer; empty without a recording."""
+    """The command that opens the frame in the viewer; empty without a recording."""
 
 
 @dataclass(frozen=True)
 class LinkList(Block):
-    """Titles with the addresses that they lead to; paper has none."""
+    """Titles of links with their addresses; paper has none."""
 
     links: Sequence[tuple[str, str]]
     command: str = ""
-    """What to type next, after the links."""
+    """The command to type next, after the links."""

@@ -1,4 +1,4 @@
-"""The report of a comparison: for a terminal, a pull request (Markdown), paper and a page."""
+"""The report of a comparison for a terminal, a pull request (Markdown), paper and a page."""
 
 from __future__ import annotations
 
@@ -22,40 +22,32 @@ from roadeval.report.blocks import (
     Block,
     BulletList,
     Cell,
-    Document,
     Figure,
     Heading,
+    Report,
     Table,
     TableOfContents,
     Text,
+    blocks_as_markdown,
 )
-from roadeval.report.blocks import markdown as written
+from roadeval.report.captions import caption
 from roadeval.report.chart import Chart
 from roadeval.report.charts import standard as charts
-from roadeval.results import comparison as told
+from roadeval.results import comparison as sentences
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
 Row = MaskChange | MovedFrame | RegionChange | DriveChange
-"""Something about a variant of a new result."""
+"""A fact on a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
-"""What a row has in each column, by their titles."""
+"""The function that makes a row's cell in each column, by the columns' titles."""
 NAMED: Final = 20
-"""Drives that a table of changed ones names, of each mask."""
+"""Most drives in the table of a mask's changed drives."""
 CHANGE: Final = ("base %", "new %", "change pp", "interval pp")
-"""The titles of a change."""
+"""The titles of a change's columns."""
 _COMMAND: Final = "in the viewer"
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp")
-"""The columns that hold words, beside the commands."""
-_REGIONS: Final = (
-    "ERR of the final masks, percent: means over the frames that label any of it, and over drives "
-    "where there are several."
-)
-_SAME: Final = "Regions without any change are left out."
-_LEFT_OUT: Final = (
-    "A region that is not the same pixels in both, as the shadow that another filter found, is "
-    "left out."
-)
+"""The columns of words, beside the commands."""
 
 
 def document(
@@ -63,18 +55,18 @@ def document(
     judgements: Sequence[Judgement],
     over_drive: Sequence[Chart],
     inspect: Inspect | None = None,
-) -> Document:
+) -> Report:
     """Return a comparison as a document.
 
-    ``judgements`` are of the limits that were set, ``over_drive`` has the rates of the masks over
-    the drive, if any, and ``inspect`` returns the command that opens a frame of a result, by its
-    label; None: no commands.
+    ``judgements`` judge the limits of the command, ``over_drive`` are charts of the masks' rates
+    over the drive, if any, and ``inspect`` returns the command that opens a frame of a result, by
+    the result's label; None: no commands.
     """
-    labels = [each.label for each in comparison.results]
-    return Document(
+    labels = [result.label for result in comparison.results]
+    return Report(
         kicker="roadeval comparison",
         title=listing(labels),
-        subtitle="; ".join(map(_about, comparison.results)),
+        subtitle="; ".join(map(_subtitle, comparison.results)),
         footer=f"comparison of {listing(labels)}",
         blocks=[
             Heading("What changed"),
@@ -93,11 +85,13 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
     title = "roadeval comparison"
     if judgements:
-        title = f"roadeval: {told.headline([each.holds for each in judgements])}"
-    return f"# {title}\n\n{written(blocks)}"
+        exceeded = [judgement.holds for judgement in judgements]
+        title = f"roadeval: {sentences.headline(exceeded)}"
+    return f"# {title}\n\n{blocks_as_markdown(blocks)}"
 
 
-def _about(result: ComparedResult) -> str:
+def _subtitle(result: ComparedResult) -> str:
+    """Return the frames or drives of a result in words."""
     if result.drive is not None:
         return f"{result.label}: {result.frames} frames of {result.drive}"
     return f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
@@ -111,26 +105,27 @@ def _warnings(comparison: Comparison) -> Iterator[Block]:
 def overview(
     comparison: Comparison, judgements: Sequence[Judgement], most: int | None = None
 ) -> Iterator[Block]:
-    """Yield what changed: limits, the verdict, settings, all rates, and where masks differ.
+    """Yield the changes: limits, the verdict, settings, all rates, and where masks differ.
 
-    ``judgements`` are of the limits that were set; at most ``most`` changed settings are named.
+    ``judgements`` judge the limits of the command; at most ``most`` changed settings are named.
     """
     for title, kind, tone in (
         ("Limits exceeded", True, "warning"),
         ("Not judged", None, "warning"),
         ("Limits kept", False, "plain"),
     ):
-        if lines := [told.describe_judgement(each) for each in judgements if each.holds is kind]:
+        limits = [limit for limit in judgements if limit.holds is kind]
+        if lines := [sentences.describe_judgement(limit) for limit in limits]:
             yield BulletList(title, lines, tone)
-    yield Text(told.verdict(comparison), "verdict")
-    yield from (Text(line) for line in told.changed_settings(comparison, most))
+    yield Text(sentences.verdict(comparison), "verdict")
+    yield from (Text(line) for line in sentences.changed_settings(comparison, most))
     yield from _changes(comparison)
-    if where := told.where(comparison):
+    if where := sentences.where(comparison):
         yield BulletList("Where", where)
 
 
 def _changes(comparison: Comparison) -> Iterator[Block]:
-    """Yield a table a result: ERR of each stage, and every rate of final masks."""
+    """Yield a table of each result: ERR of each stage, and every rate of final masks."""
     base = comparison.results[0].label
     alone = all(row.result == row.variant for row in comparison.changes)
     for result, rows in _by(_changed(comparison), lambda row: "" if alone else row.result):
@@ -138,14 +133,14 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
         over = f": {drives} drives in common" if drives > 1 else ""
         lines: list[list[Cell | str]] = []
         breaks = []
-        for variant, own in _by(rows, lambda row: row.variant):
+        for variant, of_variant in _by(rows, lambda row: row.variant):
             breaks.append(len(lines))
-            for row in own:
+            for row in of_variant:
                 for rate in SHORT if row.final else [TESTED]:
                     first, change = rate == TESTED, row.difference[rate]
                     lines.append(
                         [
-                            variant if first and row is own[0] else "",
+                            variant if first and row is of_variant[0] else "",
                             row.stage if first else "",
                             rate,
                             percent(row.base[rate]),
@@ -162,20 +157,14 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
             caption=f"{result} against {base}{over}".strip(),
             small=True,
         )
-    over = (
-        "Means over the drives that both have, of the frames that both evaluated; a group of "
-        "drives counts as one."
-        if comparison.drives
-        else "Means over the frames that both evaluated."
-    )
-    legend = correction(row.difference[TESTED] for row in comparison.changes)
-    yield Text(f"{over} A change is new minus base.", "note")
-    if legend:
+    means = caption("means over drives" if comparison.drives else "means over frames")
+    yield Text(f"{means} {caption('a change')}", "note")
+    if legend := correction(row.difference[TESTED] for row in comparison.changes):
         yield Text(legend, "note")
 
 
 def _changed(comparison: Comparison) -> list[MaskChange]:
-    """Return what is shown of a comparison: not the variants of which no stage changed."""
+    """Return the changes to show, without the variants of which no stage changed."""
     names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
     return [row for row in comparison.changes if (row.result, row.variant) in names]
 
@@ -183,25 +172,25 @@ def _changed(comparison: Comparison) -> list[MaskChange]:
 def _by(
     rows: Sequence[MaskChange], key: Callable[[MaskChange], str]
 ) -> list[tuple[str, list[MaskChange]]]:
-    return [(name, [*own]) for name, own in groupby(rows, key)]
+    return [(name, [*group]) for name, group in groupby(rows, key)]
 
 
-def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
-    """Tabulate rows: what names one, without a result that says nothing new, and columns.
+def _table(rows: Sequence[Row], columns: Columns, legend: str = "") -> Table:
+    """Tabulate rows: their result, unless it is always the same, their variant, and columns.
 
-    A rule is drawn where another result begins.
+    A rule stands above the first row of each further result.
     """
     names: Columns = {"result": lambda row: row.result, "variant": lambda row: row.variant}
     results = [row.result for row in rows]
     if len(set(results)) == 1 or all(row.result == row.variant for row in rows):
         del names["result"]
-    made = names | columns
+    columns = names | columns
     return Table(
-        [*made],
-        [[cell(row) for cell in made.values()] for row in rows],
-        text_columns=[p for p, title in enumerate(made) if title in (*_WORDS, _COMMAND)],
+        [*columns],
+        [[cell(row) for cell in columns.values()] for row in rows],
+        text_columns=[p for p, title in enumerate(columns) if title in (*_WORDS, _COMMAND)],
         breaks=[place for place, (a, b) in enumerate(pairwise(results), 1) if a != b],
-        caption=caption,
+        caption=legend,
         small=True,
     )
 
@@ -209,18 +198,17 @@ def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
 def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Block]:
     finals = [row for row in _changed(comparison) if row.final]
     if finals:
-        caption = "Change of the final mask's rates against the base."
-        yield Figure(charts.changes(finals), caption)
+        yield Figure(charts.changes(finals), caption("change of rates"))
     if over_drive:
         yield Heading("Over the drive", 2)
-        yield Figure(over_drive, f"{TESTED} of the final masks over the common frames.")
+        yield Figure(over_drive, caption("common frames", rate=TESTED))
 
 
 def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator[Block]:
-    """Yield the drives that changed, and the regions and frames in which masks differ."""
+    """Yield the drives that changed, and the regions and frames on which masks differ."""
     if comparison.drives:
         yield Heading("Which drives changed")
-        yield Text(told.DISCOVERY, "note")
+        yield Text(sentences.DISCOVERY, "note")
         yield from _plot(comparison)
         yield from changed_drives(comparison)
     if comparison.regions:
@@ -232,9 +220,10 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
                 "frames": lambda row: str(row.frames),
                 **_change(lambda row: marked_interval(row.difference)),
             }
-            yield _table(rows, columns, _REGIONS)
-        same = "" if len(rows) == len(comparison.regions) else _SAME
-        yield Text(" ".join(filter(None, [legend, same, _LEFT_OUT])), "note")
+            yield _table(rows, columns, caption("regions of a comparison"))
+        unchanged = "" if len(rows) == len(comparison.regions) else "regions without a change"
+        notes = [caption(name) for name in (unchanged, "regions left out") if name]
+        yield Text(" ".join(filter(None, [legend, *notes])), "note")
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         columns = {
@@ -250,9 +239,9 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
 
 
 def changed_drives(comparison: Comparison) -> Iterator[Block]:
-    """Yield a table a mask of the drives that changed, the surest first."""
-    for (result, variant), own in _by_mask(comparison).items():
-        if rows := [row for row in own if row.changed]:
+    """Yield a table for each mask of the drives that changed, the surest first."""
+    for (result, variant), changes in _by_mask(comparison).items():
+        if rows := [row for row in changes if row.changed]:
             shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
             title = f"{variant} of {result}" if len(comparison.results) > 2 else variant
             yield Heading(f"Drives on which {title} changed{shown}, the surest first", 2)
@@ -260,17 +249,15 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
                 "drive": lambda row: row.drive,
                 "frames": lambda row: number(row.frames),
                 **_change(lambda row: interval(row.difference.low, row.difference.high)),
-                "q": lambda row: _q_value(row.q),
+                "q": lambda row: (
+                    DASH if row.q is None else "<0.001" if row.q < 0.001 else f"{row.q:.3f}"
+                ),
             }
             yield _table(rows[:NAMED], columns)
 
 
-def _q_value(q: float | None) -> str:
-    return DASH if q is None else "<0.001" if q < 0.001 else f"{q:.3f}"
-
-
 def _change(ends: Callable[[Any], str]) -> Columns:
-    """Return the columns of a change of ERR, given what writes its interval."""
+    """Return the columns of a change of ERR; ``ends`` writes its interval."""
     cells: tuple[Callable[[Any], Cell | str], ...] = (
         lambda row: percent(row.base),
         lambda row: percent(row.new),
@@ -291,11 +278,11 @@ def _plot(comparison: Comparison) -> Iterator[Block]:
     """Yield the change of the first mask on every drive."""
     import pandas as pd
 
-    (result, variant), own = next(iter(_by_mask(comparison).items()))
-    drives = [(row.drive, asdict(row.difference)) for row in own if row.difference.units]
+    (result, variant), changes = next(iter(_by_mask(comparison).items()))
+    drives = [(row.drive, asdict(row.difference)) for row in changes if row.difference.units]
     if drives:
         rows = pd.DataFrame([{"name": name, "group": "", **change} for name, change in drives])
-        mask = result, variant, own[0].stage
+        mask = result, variant, changes[0].stage
         (over,) = (
             row.difference[TESTED]
             for row in comparison.changes

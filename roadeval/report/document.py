@@ -1,13 +1,14 @@
-"""The report of one drive, or of many: its sections and their order."""
+"""The report of one drive or of many: its sections and their order."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from itertools import chain
 from typing import Any, Final
 
 from roadeval.data.words import number
-from roadeval.report.blocks import Block, Document
+from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
 from roadeval.report.sections import drive, drives, frames, ground, provenance, rig, summary
 from roadeval.report.sections.frames import FrameBrowser
@@ -20,51 +21,49 @@ SCORED: Final = (
     *(drive.over_drive, drive.filter_effect, drive.regions, ground.on_the_ground),
     *(drive.stages, drive.thresholds),
 )
-"""The sections of a drive with truth; without it there is one on its masks."""
-
-
+"""The sections of a drive with truth; a drive without truth has a section on its masks."""
 RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
 """The sections of several cameras of a drive."""
 
 
-def document(findings: Findings | FleetFolder) -> Document:
+def document(findings: Findings | FleetFolder) -> Report:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFolder):
         parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
-        return _of(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
+        return _compose(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
     if findings.cameras:
-        return _of(findings, *RIG, provenance.section)
-    # The frames, which fill pages, come last: what is short finds room before them.
+        return _compose(findings, *RIG, provenance.section)
+    # Frames fill pages, so they come last.
     scored = SCORED if findings.totals else (drive.masks,)
     gallery = (frames.worst_frames,) if findings.totals or findings.worst else ()
-    return _of(findings, *scored, provenance.section, *gallery)
+    return _compose(findings, *scored, provenance.section, *gallery)
 
 
 def page_document(
     findings: Findings | FleetFolder, browsed: FrameBrowser | None, worst_frames: int = 0
-) -> Document:
+) -> Report:
     """Return the report as a page: with a browser of frames, or a table of all drives.
 
-    That of many drives has at most so many of the worst frames.
+    ``worst_frames`` limits the worst frames of many drives.
     """
     if isinstance(findings, FleetFolder):
         worst = partial(drives.worst, across=ACROSS, most=worst_frames)
         parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
-        return _of(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
+        return _compose(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     if findings.cameras:
-        return _of(findings, *RIG, provenance.section)
+        return _compose(findings, *RIG, provenance.section)
     scored = SCORED if findings.totals else (drive.masks,)
-    return _of(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
+    return _compose(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
 
 
-def _of(findings: Findings | FleetFolder, *sections: Section) -> Document:
+def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
     of_fleet = isinstance(findings, FleetFolder)
-    return Document(
+    return Report(
         kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,
         subtitle=", ".join(_subtitle(findings)),
         footer=", ".join(dict.fromkeys((findings.name, str(findings.path)))),
-        blocks=[block for each in (summary.section, *sections) for block in each(findings)],
+        blocks=[*chain.from_iterable(part(findings) for part in (summary.section, *sections))],
         keywords=[
             *("road recognition", "evaluation", *(["fleet"] if of_fleet else []), findings.name)
         ],

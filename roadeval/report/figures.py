@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -22,10 +21,10 @@ from matplotlib.transforms import Bbox, TransformedBbox
 from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, Rgb, as_plain
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import finals, values_of
-from roadeval.report.chart import FAINT, thinned
+from roadeval.report.chart import FAINT, thin
 from roadeval.report.charts.standard import over_windows
-from roadeval.report.images import ExampleFrame, finest_jpeg, pictures_of
-from roadeval.report.pdf.typeset import figure_as
+from roadeval.report.images import ExampleFrame, encode_jpeg, pictures_of
+from roadeval.report.pdf.typeset import typeset_figure
 from roadeval.runtime.text import elide, visible
 from roadeval.runtime.threads import map_ordered
 
@@ -75,42 +74,40 @@ def write_figures(
 ) -> list[Path]:
     """Write every figure that has something to draw as PNG and PDF; return the files.
 
-    The folder is made if it is not there. ``windows`` are as in ``windows.csv``, of any number of
-    variants, without a row where there is no truth; ``examples`` are a few frames, for figure 2;
-    ``camera`` is which one of a rig, for titles and the files' names. An
-    OSError if the folder cannot be written to; a `ReportError` if the system's folder for temporary
-    files cannot be.
+    The folder is made if it is not there. ``windows`` are the rows of ``windows.csv``, of any
+    number of variants, or no rows without truth; ``examples`` are a few frames, for figure 2;
+    ``camera`` is the name of a camera of a rig, for titles and the files' names. An OSError if the
+    folder cannot be written to; a `ReportError` if the system's folder for temporary files cannot
+    be.
     """
     folder.mkdir(parents=True, exist_ok=True)
     drive = f"{drive}, {camera}" if camera else drive
     ending = f"-{as_plain(camera)}" if camera else ""
 
-    def drawn() -> Iterator[tuple[str, bytes]]:
+    def draw() -> Iterator[tuple[str, bytes]]:
         with mpl.rc_context(RC):  # type: ignore[arg-type]
             if examples:
-                yield f"fig2_masks{ending}", svg(road_masks(drive, examples))
+                yield f"fig2_masks{ending}", as_svg(road_masks(drive, examples))
             if len(windows):
-                yield f"fig3a_error_rate{ending}", svg(error_rate(drive, windows))
-                yield f"fig3b_fp_fn_rate{ending}", svg(fp_fn_rate(drive, windows))
+                yield f"fig3a_error_rate{ending}", as_svg(error_rate(drive, windows))
+                yield f"fig3b_fp_fn_rate{ending}", as_svg(fp_fn_rate(drive, windows))
 
-    # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
-    # and beside the drawing of the next figure; Matplotlib's own ways draw a figure once for each,
-    # and take ten times as long.
-    return [path for files in map_ordered(partial(_write, folder), drawn(), 1) for path in files]
+    def write(named_svg: tuple[str, bytes]) -> list[Path]:
+        name, svg = named_svg
+        files = {
+            folder / f"{name}.png": typeset_figure(svg, "png", DPI),
+            folder / f"{name}.pdf": typeset_figure(svg, "pdf"),
+        }
+        for path, content in files.items():
+            path.write_bytes(content)
+        return list(files)
 
-
-def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
-    name, drawing = figure
-    files = {
-        folder / f"{name}.png": figure_as("png", drawing, DPI),
-        folder / f"{name}.pdf": figure_as("pdf", drawing),
-    }
-    for path, content in files.items():
-        path.write_bytes(content)
-    return list(files)
+    # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
+    # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.
+    return [path for paths in map_ordered(write, draw(), 1) for path in paths]
 
 
-def svg(figure: Figure) -> bytes:
+def as_svg(figure: Figure) -> bytes:
     """Return a figure as SVG."""
     content = BytesIO()
     figure.savefig(content, format="svg", dpi=DPI, metadata={"Date": None})
@@ -118,7 +115,7 @@ def svg(figure: Figure) -> bytes:
 
 
 MARKED: Final = 25
-"""Up to this many points each has its marker; beyond, about as many do."""
+"""Most markers along a line; a line with more points has markers at regular distances."""
 CROWDED: Final = 150
 """More windows than this are drawn as means of neighbours."""
 _LABELS: Final = {
@@ -133,8 +130,8 @@ _DASHES: Final = {
     "dash-dotted": (0, (7, 2, 1.5, 2)),
 }
 _MARKS: Final = {"circle": "o", "square": "s", "triangle": "^", "diamond": "D", "cross": "x"}
-_WIDEST: Final = 80
-"""Letters that have room in a line of a figure, with a legend's lines beside them."""
+_LONGEST: Final = 80
+"""Letters of a variant's name that fit in a line of the legend."""
 
 
 def error_rate(drive: str, windows: pd.DataFrame) -> Figure:
@@ -152,7 +149,7 @@ def fp_fn_rate(drive: str, windows: pd.DataFrame) -> Figure:
 
 
 def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> Figure:
-    """Draw rates of each variant's final mask, each with its label, one below the other."""
+    """Draw the rates of every variant's final mask over the drive, one rate below the other."""
     charts = over_windows(windows, [*rates])
     figure = Figure(figsize=(WIDTH, 1.9 + 2 * len(charts)), layout="constrained")
     figure.suptitle(visible(title), x=0.012, ha="left", size=11, weight="bold", color=INK)
@@ -160,17 +157,17 @@ def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> 
     for ax, chart, label in zip(axes, charts, rates.values(), strict=True):
         ax.set_ylabel(label)
         for series in reversed(chart.series):
-            few, look = thinned(series, CROWDED), series.look
+            thinned, look = thin(series, CROWDED), series.look
             ax.plot(
-                few.x,
-                few.y,
+                thinned.x,
+                thinned.y,
                 color=look.colour,
                 linestyle=_DASHES[look.dash],
                 linewidth=1.8,
                 marker=_MARKS[look.mark],
                 markerfacecolor="white" if look.hollow else look.colour,
                 markersize=5,
-                markevery=-(-len(few.x) // MARKED),
+                markevery=-(-len(thinned.x) // MARKED),
                 clip_on=False,
                 label=series.name,
             )
@@ -182,12 +179,12 @@ def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> 
         ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
     axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     axes[-1].set_xlabel("frame")
-    handles, names = (found[::-1] for found in axes[0].get_legend_handles_labels())
-    names = [elide(_LABELS.get(name, name), _WIDEST) for name in names]
-    columns = 100 // (max(map(len, names)) + 10)
+    lines, variants = (entries[::-1] for entries in axes[0].get_legend_handles_labels())
+    labels = [elide(_LABELS.get(variant, variant), _LONGEST) for variant in variants]
+    columns = 100 // (max(map(len, labels)) + 10)
     axes[0].legend(
-        handles,
-        names,
+        lines,
+        labels,
         title=_subtitle(windows),
         title_fontproperties={"size": 8.5},
         alignment="left",
@@ -205,52 +202,54 @@ def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> 
 def _subtitle(windows: pd.DataFrame) -> str:
     stages = ", ".join(values_of(finals(windows), "stage"))
     size, rows = windows["frames"].max(), -(-windows["window"].nunique() // CROWDED)
-    each = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
-    return f"Final mask ({stages}); each point is the mean of {each}; lower is better"
+    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    return f"Final mask ({stages}); each point is the mean of {point}; lower is better"
 
 
 LEFT: Final = 0.28
 TOP: Final = 0.78
-"""Inches left of and above the pictures, for the frames' numbers and the titles."""
+"""Inches left of the pictures, for the frames' numbers, and above them, for the titles."""
 GAP: Final = 0.05
-"""Inches between pictures, and to what names them."""
+"""Inches between pictures, and between a picture and its name."""
 
 
 def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
-    """Draw figure 2 of the paper: the image, each variant's mask over it, and the truth over it."""
+    """Draw figure 2 of the paper: the image, and over it each variant's mask, and the truth."""
     rows = [*pictures_of([example.small() for example in examples])]
     height, width = rows[0]["camera image"].shape[:2]
-    across = (WIDTH - LEFT) / len(rows[0])
-    down = (across - GAP) * height / width + GAP
-    total = TOP + down * len(rows) + GAP
-    figure = Figure(figsize=(WIDTH, total))
+    column_width = (WIDTH - LEFT) / len(rows[0])
+    row_height = (column_width - GAP) * height / width + GAP
+    figure_height = TOP + row_height * len(rows) + GAP
+    figure = Figure(figsize=(WIDTH, figure_height))
 
     def write(x: float, y: float, text: str, **look: Any) -> None:
-        figure.text(x / WIDTH, 1 - y / total, text, **look)
+        figure.text(x / WIDTH, 1 - y / figure_height, text, **look)
 
     title = visible(f"Road masks on {drive}")
     write(0.1, 0.1, title, size=11, weight="bold", color=INK, va="top")
     write(0.1, 0.32, _legend(examples), size=8.5, color=FAINT, va="top")
-    for number, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
-        top, bottom = TOP + number * down, TOP + (number + 1) * down - GAP
-        name = f"frame {example.frame}" if down > 0.7 else str(example.frame)
+    for row, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
+        top, bottom = TOP + row * row_height, TOP + (row + 1) * row_height - GAP
+        name = f"frame {example.frame}" if row_height > 0.7 else str(example.frame)
         beside = {"rotation": 90, "ha": "right", "va": "center", "size": SMALL, "color": FAINT}
         write(LEFT - GAP, (top + bottom) / 2, name, **beside)
         for column, (title, picture) in enumerate(pictures.items()):
-            left, right = LEFT + column * across, LEFT + (column + 1) * across - GAP
-            sides = left / WIDTH, 1 - bottom / total, right / WIDTH, 1 - top / total
-            Picture(figure, picture, Bbox.from_extents(*sides))
-            if number == 0:
-                name = elide(title, max(int(11 * across), 3))
+            left, right = LEFT + column * column_width, LEFT + (column + 1) * column_width - GAP
+            low, high = 1 - bottom / figure_height, 1 - top / figure_height
+            box = Bbox.from_extents(left / WIDTH, low, right / WIDTH, high)
+            FigurePicture(figure, picture, box)
+            if row == 0:
+                name = elide(title, max(int(11 * column_width), 3))
                 above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
                 write((left + right) / 2, TOP - GAP, name, **above)
     return figure
 
 
 def _legend(examples: Sequence[ExampleFrame]) -> str:
-    ignored = any(e.truth is not None and (e.truth == IGNORE).any() for e in examples)
-    names = {name for e in examples for name in e.masks}
-    missing = any(names - e.masks.keys() for e in examples)
+    truths = [example.truth for example in examples if example.truth is not None]
+    ignored = any((truth == IGNORE).any() for truth in truths)
+    variants = {variant for example in examples for variant in example.masks}
+    missing = any(variants - example.masks.keys() for example in examples)
     return (
         "Green: road"
         + "; grey: ignored, counted nowhere" * ignored
@@ -258,12 +257,12 @@ def _legend(examples: Sequence[ExampleFrame]) -> str:
     )
 
 
-class Picture(FigureImage):
+class FigurePicture(FigureImage):
     """An ``(H, W, 3)`` uint8 RGB image that fills a box, given in shares of its figure.
 
-    Matplotlib's own way takes some ten times as long: it brings a picture to size by filters that
-    show no difference here, and packs it into an SVG as PNG. Typst takes a JPEG into a PDF as it
-    is, and would unpack a PNG and pack it again.
+    Matplotlib's own method takes some ten times as long: it resizes a picture with filters that
+    make no visible difference here, and stores it in an SVG as PNG. Typst copies a JPEG into a PDF,
+    but decodes a PNG and compresses it again.
     """
 
     def __init__(self, figure: Figure, image: Rgb, box: Bbox) -> None:
@@ -274,12 +273,12 @@ class Picture(FigureImage):
         figure.add_artist(self)
 
     def can_composite(self) -> bool:
-        """Return False: it stays a picture of its own, and is not made one with those beside it."""
+        """Return False: Matplotlib must not merge the picture with its neighbours."""
         return False
 
     def draw(self, renderer: Any) -> None:
-        """Draw it into an SVG, as JPEG."""
-        content = base64.b64encode(finest_jpeg(self._image)).decode()
+        """Draw the picture into an SVG, as JPEG."""
+        jpeg = base64.b64encode(encode_jpeg(self._image, finest=True)).decode()
         renderer.writer.element(
             "image",
             x=f"{self.box.x0:.6g}",
@@ -287,5 +286,5 @@ class Picture(FigureImage):
             width=f"{self.box.width:.6g}",
             height=f"{self.box.height:.6g}",
             preserveAspectRatio="none",
-            attrib={"xlink:href": f"data:image/jpeg;base64,{content}"},
+            attrib={"xlink:href": f"data:image/jpeg;base64,{jpeg}"},
         )

@@ -1,4 +1,4 @@
-"""The content of a report on one drive: its facts and tables, and the frames that a job picked."""
+"""The content of a report on one drive: facts, tables, and frames that a job picked."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 WINDOWS: Final = 30
-"""Points of the figures over the drive, at most."""
+"""Most points of the figures over the drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,51 +38,51 @@ class NotableFrame:
 
     frame: int
     stamp_ns: int
-    """Which."""
     variant: str
-    """Whose failure or change it is; empty of a row of a table, and without truth."""
+    """The variant that fails or changes; empty in a row of a table, and without truth."""
     rates: Mapping[str, Mapping[str, float]]
-    """Of each variant's final mask, as short tables show them; without truth its doubts."""
+    """Rates of each variant's final mask, as in short tables; without truth its signs of doubt."""
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of the ERR of ``variant``, by stage, see `roadeval.evaluation.tables.causes`."""
     change: float | None = None
-    """The filter's change of ERR, or None."""
+    """The filter's effect on ERR, or None."""
     notes: Sequence[str] = ()
     """Sentences about it."""
     conditions: Sequence[str] = ()
-    """In words, as ``much shadow``."""
+    """Conditions in words, as ``much shadow``."""
     images: Sequence[LayerImage] = ()
-    """The camera, the truth and the errors; none where the recording is not at hand."""
+    """The camera, the truth and the errors; empty without the recording."""
     layers: Sequence[Sequence[LayerImage]] = ()
-    """A row a variant: its layers in the order of the stages."""
+    """A row for each variant: its layers in the order of the stages."""
 
     @property
     def error(self) -> float:
-        """The ERR of the focus, or its first doubt; below 0 if none is defined."""
+        """The ERR of the focus, or its first sign of doubt; -1 if none is defined."""
         rates = self.rates.get(focus_of(self.rates) or "", {})
         return next((rates[by] for by in (TESTED, *SIGNS) if defined(rates.get(by))), -1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """Everything that a report of one drive shows."""
+    """The content of a report on one drive."""
 
     path: str
-    """The recording or folder, as it was named."""
+    """The recording or folder, as the user named it."""
     facts: Facts
-    """Of an incomplete run, what its tables allow to compute."""
+    """The facts; of an incomplete run those that its tables give."""
     table: Callable[[str], pd.DataFrame] = lambda name: read_table(name, "")
-    """Returns a table by its name; by default one without a row."""
+    """The function that returns a table by its name; by default without rows."""
     complete: bool = True
     """Whether the run reached its end."""
     again: str = ""
-    """The command that makes the results again; empty where their configuration is lost."""
+    """The command that makes the results again; empty if their configuration is lost."""
     inspect: Callable[[int], str] | None = None
-    """Returns the command that opens a frame in the viewer; None without a recording."""
+    """The function that returns the command to open a frame in the viewer; None without a
+    recording."""
     properties: Mapping[str, Any] = field(default_factory=dict)
-    """The recording's own, about its origin."""
+    """The recording's properties, about its origin."""
     pictured: int = 0
-    """Number of frames with pictures, of those evaluated, or without truth of all."""
+    """Number of evaluated frames with pictures, or without truth of all frames with pictures."""
     examples: Sequence[ExampleFrame] = ()
     """Frames for figure 2."""
     thumbnails: Sequence[LayerImage] = ()
@@ -90,15 +90,15 @@ class Findings:
     worst: Sequence[NotableFrame] = ()
     helped: Sequence[NotableFrame] = ()
     harmed: Sequence[NotableFrame] = ()
-    """Frames to look at."""
+    """Frames to look at: those with the greatest errors, and the greatest effects of the filter."""
     cameras: Mapping[str, Findings] = field(default_factory=dict)
-    """Of a rig: each camera's own, by its name; there are no tables of all together."""
+    """Findings of each camera of a rig, by its name; a rig has no tables of its own."""
     camera: str = ""
-    """Of a rig: which camera this is."""
+    """The name of this camera in a rig."""
 
     @property
     def name(self) -> str:
-        """The drive's name, and of a rig the camera's."""
+        """The drive's name, followed by the camera's in a rig."""
         return ", ".join(filter(None, (self.facts.drive.name, self.camera)))
 
     @property
@@ -122,7 +122,7 @@ class Findings:
 
     @cached_property
     def windows(self) -> pd.DataFrame:
-        """The rows of ``windows``; longer windows where the drive is long."""
+        """The rows of ``windows``; a long drive has longer windows."""
         size, windows = self.facts.evaluation.window, self.table("windows")
         frames = self.table("frames")
         count = -(-frames["frame"].nunique() // size)
@@ -137,7 +137,7 @@ class Findings:
 
     @cached_property
     def changes(self) -> Mapping[tuple[str, str], Sequence[float]]:
-        """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
+        """The shares of labelled pixels that a stage repaired and spoiled, by variant and stage."""
         steps = self.table("changes").astype({"from_variant": str, "to_variant": str})
         steps = steps[(steps["from_variant"] == steps["to_variant"]) & (steps["N"] > 0)]
         shares = steps[["repaired", "spoiled"]].div(steps["N"], axis=0)
@@ -150,11 +150,11 @@ class Findings:
         frames = self.table("frames")
         names = [name for name in values_of(frames, "variant") if name != BASELINE]
         means = ((name, tables.causes(frames, name).mean()) for name in names)
-        return {name: dict(zip(own.index, own, strict=True)) for name, own in means}
+        return {name: dict(zip(parts.index, parts, strict=True)) for name, parts in means}
 
     @cached_property
     def heatmaps(self) -> Mapping[str, Floats]:
-        """By variant ``(2, rows, columns)``, how often FP and FN are there; NaN if not labelled."""
+        """Shares of FP and FN, ``(2, rows, columns)`` by variant; NaN where never labelled."""
         maps = {}
         for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))
@@ -171,11 +171,11 @@ class Findings:
         intervals: dict[tuple[str, str], Interval] = {}
         for band in (band_name(*ends) for ends in pairwise(settings.distances)):
             for variant in values_of(rows, "variant"):
-                own = errors[only(rows, region=band, variant=variant).index].to_numpy()
-                if len(own):
+                shares = errors[only(rows, region=band, variant=variant).index].to_numpy()
+                if len(shares):
                     low = high = None
-                    if len(own) >= settings.least_frames and np.ptp(own):
-                        ends = mean_distribution(own).interval(settings.confidence)
+                    if len(shares) >= settings.least_frames and np.ptp(shares):
+                        ends = mean_distribution(shares).interval(settings.confidence)
                         low, high = np.clip(ends, 0, 1).tolist()
-                    intervals[band, variant] = float(own.mean()), low, high
+                    intervals[band, variant] = float(shares.mean()), low, high
         return intervals

@@ -1,4 +1,4 @@
-"""Camera images and layers as pictures: each layer is coloured by its description."""
+"""Camera images and layers as pictures; a layer's description gives its colours."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import numpy.typing as npt
 from roadeval.data import TRUTH, LayerKind, LayerSpec, Mask, Rgb, Truth, colours, mask_spec
 from roadeval.data.arrays import Floats
 from roadeval.images.decoding import png_of
-from roadeval.report.blocks import ImageFile
+from roadeval.report.blocks import ImageFile, ImageGrid
 
 ROAD: Final = mask_spec("road", "road")
 EXAMPLE_WIDTH: Final = 400
-"""Pixels across an example's picture, at most."""
+"""Most pixels across an example's picture."""
 WIDTH: Final = 420
-"""Pixels across a picture, at most: about 200 an inch at a quarter of the page."""
+"""Most pixels across a picture: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
 FINEST: Final = 95
-"""Quality of a JPEG, and of one of which a figure is made."""
+"""Quality of a JPEG in a report, and in a figure of its own."""
 FADED: Final = 5
-"""The part of the camera's contrast that is left where there is no mask, as one of so many."""
+"""Divisor of the camera's contrast where there is no mask."""
 DARKEN: Final = 0.75
-"""Share of the camera's brightness that stays below an overlay."""
+"""Share of the camera's brightness that remains below an overlay."""
 
 _LEVELS: Final = np.arange(256, dtype=np.uint8)[:, None]
 
@@ -54,10 +54,10 @@ class ExampleFrame:
     truth: Truth | None
     """``(H, W)`` uint8 (0, 1, 255)."""
     masks: Mapping[str, Mask]
-    """``(H, W)`` uint8 (0, 1) by variant; one whose masks another system has made may have none."""
+    """``(H, W)`` uint8 (0, 1) by variant; masks of another system may be missing."""
 
     def small(self) -> ExampleFrame:
-        """Return the example in the size in which it is drawn, of which a run can hold a few."""
+        """Return the example in the size of its picture, so that a run can hold a few."""
         return ExampleFrame(
             self.frame,
             shrink(self.image, EXAMPLE_WIDTH),
@@ -69,45 +69,53 @@ class ExampleFrame:
 def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
     """Yield each example's pictures by their titles: the image, and masks and truth over it.
 
-    A variant that has no mask of a frame has the image nearly white. All have the same titles.
+    In place of a missing mask there is a nearly white image. All examples have the same titles.
     """
-    names = dict.fromkeys(name for each in examples for name in each.masks)
-    labelled = any(each.truth is not None for each in examples)
-    for each in examples:
-        found = {"camera image": each.image}
+    names = dict.fromkeys(name for example in examples for name in example.masks)
+    labelled = any(example.truth is not None for example in examples)
+    for example in examples:
+        image = example.image
+        pictures = {"camera image": image}
         for name in names:
-            mask = each.masks.get(name)
-            over = None if mask is None else painted(LayerImage(name, each.image, ROAD, mask))
-            found[name] = faded(each.image) if over is None else over
+            mask = example.masks.get(name)
+            if mask is None:
+                pictures[name] = fade(image)
+            else:
+                pictures[name] = paint(LayerImage(name, image, ROAD, mask))
         if labelled:
-            found["truth"] = painted(LayerImage("truth", each.image, TRUTH, each.truth))
-        yield found
+            pictures["truth"] = paint(LayerImage("truth", image, TRUTH, example.truth))
+        yield pictures
+
+
+def example_grid(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
+    """Return a row for each frame: the image, and over it each variant's mask, and the truth."""
+    rows = [*pictures_of(examples)]
+    pictures = [
+        (title if place else f"frame {example.frame}", jpeg(LayerImage(title, picture)))
+        for example, row in zip(examples, rows, strict=True)
+        for place, (title, picture) in enumerate(row.items())
+    ]
+    return ImageGrid(pictures, len(rows[0]), caption=caption)
 
 
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
+    return ImageFile(encode_jpeg(shrink(paint(layer), width)))
+
+
+def encode_jpeg(image: Rgb, *, finest: bool = False) -> bytes:
+    """Return an image as a JPEG file; in the ``finest``, a line of one pixel keeps its colour."""
     import cv2
 
-    return ImageFile(_packed(shrink(painted(layer), width), cv2.IMWRITE_JPEG_QUALITY, QUALITY))
-
-
-def finest_jpeg(image: Rgb) -> bytes:
-    """Return an image as a JPEG file in which a line of one pixel keeps its colour."""
-    import cv2
-
-    colours = cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444
-    return _packed(image, cv2.IMWRITE_JPEG_QUALITY, FINEST, *colours)
-
-
-def _packed(image: Rgb, *options: int) -> bytes:
-    import cv2
-
+    options = [cv2.IMWRITE_JPEG_QUALITY, FINEST if finest else QUALITY]
+    if finest:
+        options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
     done, content = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
     assert done
     return bytes(content)
 
 
-def painted(layer: LayerImage) -> Rgb:
+def paint(layer: LayerImage) -> Rgb:
     """Return the layer as ``(H, W, 3)`` uint8 RGB."""
     if layer.spec is None or layer.array is None:
         return layer.image
@@ -115,12 +123,12 @@ def painted(layer: LayerImage) -> Rgb:
         case LayerKind.RGB:
             return layer.array.astype(np.uint8, copy=False)
         case LayerKind.SCALAR:
-            return _coloured(layer.spec, layer.array)
+            return _paint_map(layer.spec, layer.array)
         case LayerKind.MASK | LayerKind.LABELS:
-            return _overlaid(layer.image, layer.spec, layer.array)
+            return _overlay(layer.image, layer.spec, layer.array)
 
 
-def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
+def _paint_map(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
     """Colour a map of numbers over its range with Viridis, as the recording's viewer does."""
     import cv2
 
@@ -131,15 +139,15 @@ def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
     return rgb
 
 
-def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
+def _overlay(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
     """Draw the classes' colours over the darkened image."""
     import cv2
 
     colours = np.zeros((256, 4), np.float32)
-    for known in spec.classes:
-        colours[known.value] = known.rgba
+    for label_class in spec.classes:
+        colours[label_class.value] = label_class.rgba
     overlaid: Rgb = np.empty_like(image)
-    # A pixel's colour follows from its label and its own: a table of 256 for each label.
+    # The new colour depends on the label and the old colour: a table of 256 for each label.
     for label in np.flatnonzero(np.bincount(labels.ravel(), minlength=256)):
         opacity = colours[label, 3:] / 255
         mixed = _LEVELS * DARKEN * (1 - opacity) + colours[label, :3] * opacity
@@ -153,10 +161,12 @@ def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
 
     ``colour`` is half-way between; NaN is grey.
     """
-    known = np.nan_to_num(shares / (top or 1.0))[..., None]
-    ends = [np.array(each, float) for each in ((255, 255, 255), colour, colours.MOST_ERRORS)]
-    light, dark = np.minimum(2 * known, 1), np.maximum(2 * known - 1, 0)
-    cells = ends[0] + light * (ends[1] - ends[0]) + dark * (ends[2] - ends[1])
+    levels = np.nan_to_num(shares / (top or 1.0))[..., None]
+    white, middle, darkest = (
+        np.array(shade, float) for shade in ((255, 255, 255), colour, colours.MOST_ERRORS)
+    )
+    light, dark = np.minimum(2 * levels, 1), np.maximum(2 * levels - 1, 0)
+    cells = white + light * (middle - white) + dark * (darkest - middle)
     cells[np.isnan(shares)] = colours.NEVER_LABELLED
     scale = max(WIDTH // shares.shape[1], 1)
     picture = np.rint(cells).astype(np.uint8).repeat(scale, axis=0).repeat(scale, axis=1)
@@ -164,21 +174,21 @@ def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
     return ImageFile(png_of(picture))
 
 
-def faded(image: Rgb) -> Rgb:
-    """Return an image nearly white, in place of a mask that there is not."""
+def fade(image: Rgb) -> Rgb:
+    """Return an image nearly white, which takes the place of a missing mask."""
     return np.asarray(255 - (255 - image) // FADED, np.uint8)
 
 
 def shrink(
     image: npt.NDArray[np.uint8], width: int, *, labels: bool = False
 ) -> npt.NDArray[np.uint8]:
-    """Reduce an image to ``width`` pixels across, if it is wider; of labels none is mixed."""
+    """Reduce an image to ``width`` pixels across, if it is wider; labels are not mixed."""
     import cv2
 
     height, wide = image.shape[:2]
     if wide <= width:
         return image
     size = width, max(round(height * width / wide), 1)
-    how = cv2.INTER_NEAREST if labels else cv2.INTER_AREA
-    small: npt.NDArray[np.uint8] = cv2.resize(image, size, interpolation=how)
+    method = cv2.INTER_NEAREST if labels else cv2.INTER_AREA
+    small: npt.NDArray[np.uint8] = cv2.resize(image, size, interpolation=method)
     return small

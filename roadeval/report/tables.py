@@ -1,4 +1,4 @@
-"""The tables of rates and differences, of a drive and of many: for a terminal, paper and a page."""
+"""The tables of rates and differences of a drive or of many, for a terminal, paper and a page."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from roadeval.data.words import DASH, MINUS, defined, listing, number, percent, 
 from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT, SHORT_OVERLAP, TESTED
 from roadeval.evaluation.tables import final_stages
 from roadeval.report.blocks import Cell, Table
+from roadeval.report.captions import caption
 from roadeval.report.chart import looks
 from roadeval.results.facts import Facts, FleetFacts, Totals
 from roadeval.results.sentences import describe_overconfidence, marked_interval
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != TESTED)
-"""The rates whose differences stand beside that of ERR."""
+"""The rates in short tables beside ERR."""
 
 
 def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
@@ -24,15 +25,15 @@ def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
 
 
 def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
-    """Yield a cell in percent for each value; that of the best is bold."""
-    known = [value for value in values if defined(value)]
-    best = (max if higher else min)(known, default=None)
+    """Yield a cell in percent for each value; the best one is bold."""
+    defined_values = [value for value in values if defined(value)]
+    best = (max if higher else min)(defined_values, default=None)
     place = None if best is None else values.index(best)
     yield from (Cell(percent(value), bold=i == place) for i, value in enumerate(values))
 
 
 def rates_table(facts: Facts | FleetFacts) -> Table:
-    """Tabulate every final mask's rates; the best of each column is bold."""
+    """Tabulate every final mask's rates; the best rate of each column is bold."""
     finals = {name: facts.totals[name][stage] for name, stage in facts.finals.items()}
     of_fleet, names = isinstance(facts, FleetFacts), [*finals]
     counts = [number(total["frames"]) for total in finals.values()]
@@ -50,30 +51,22 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         values = [total.get(rate) for total in finals.values()]
         columns[title] = best_bold(values, higher=metric.higher_is_better)
     if isinstance(facts, FleetFacts):
-        caption = (
-            "Percent: the mean over drives of each drive's mean rate; pooled ERR is of all pixels "
-            "of all drives together, so that long drives count for more. Bold: the best."
-        )
+        sentences = [caption("rates of a fleet")]
     else:
-        beyond, edge = facts.beyond, ""
-        if widths := {each["width"] for each in beyond.values()}:
+        frames = counts[0] if alike else "the evaluated"
+        sentences = [caption("rates", frames=frames, overlap=listing([*OVERLAP]))]
+        if widths := {measured["width"] for measured in facts.beyond.values()}:
             for name in ("boundary_F", "boundary_IoU"):
-                values = [beyond.get(variant, {}).get(name) for variant in finals]
+                values = [facts.beyond.get(variant, {}).get(name) for variant in finals]
                 columns[name.replace("_", " ")] = best_bold(values, higher=True)
-            edge = (
-                f" Boundary F: the road's edge within {widths.pop()} pixels; boundary IoU: bands "
-                "along it of 2 % of the diagonal."
-            )
-        caption = (
-            f"Percent: means over {counts[0] if alike else 'the evaluated'} frames; pooled ERR, "
-            f"{listing([*OVERLAP])} are of all pixels together.{edge} Bold: the best."
-        )
+            sentences.append(caption("boundary", width=widths.pop()))
+    sentences.append(caption("bold"))
     rows = zip(*columns.values(), strict=True)
     return Table(
         ["final mask", *columns],
         [[variant_cell(name, names), *row] for name, row in zip(names, rows, strict=True)],
         small=not of_fleet,
-        caption=caption,
+        caption=" ".join(sentences),
     )
 
 
@@ -81,7 +74,7 @@ def stages_table(
     totals: Totals, changes: Mapping[tuple[str, str], Sequence[float]] | None = None
 ) -> Table:
     """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
-    finals = final_stages((name, stage) for name, own in totals.items() for stage in own)
+    finals = final_stages((name, stage) for name, stages in totals.items() for stage in stages)
     rows: list[list[Cell | str]] = []
     breaks = []
     for variant, stages in totals.items():
@@ -112,35 +105,36 @@ def stages_table(
 
 
 def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Table:
-    """Tabulate the differences of final masks, of the frames of a drive or over drives.
+    """Tabulate the differences of final masks, over the frames of a drive or over drives.
 
-    A ``brief`` table has the differences alone: neither both errors, nor how many are better.
+    A ``brief`` table has the differences alone: neither both errors, nor the numbers of better and
+    worse frames.
     """
     effects, names = facts.final_effects, [*facts.finals]
     errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
     unit = effects[0].rates[TESTED].unit
     rows: list[list[Cell | str]] = []
-    for each in effects:
-        change, words = each.rates[TESTED], f"{each.variant} {MINUS} {each.base}"
-        ends = [percent(errors[name]) for name in (each.base, each.variant)]
+    for effect in effects:
+        change, words = effect.rates[TESTED], f"{effect.variant} {MINUS} {effect.base}"
+        ends = [percent(errors[name]) for name in (effect.base, effect.variant)]
         won = [number(count or 0) for count in (change.better, change.worse)]
         if unit == "frames":
             won.append(DASH if change.effective is None else f"{change.effective:.0f}")
         rows.append(
             [
-                variant_cell(each.variant, names, words),
+                variant_cell(effect.variant, names, words),
                 *([] if brief else ends),
                 Cell(points(change.mean), bold=True),
                 marked_interval(change),
-                *(points(each.rates[rate].mean) for rate in OTHERS),
+                *(points(effect.rates[rate].mean) for rate in OTHERS),
                 *([] if brief else won),
             ]
         )
-    about = [] if brief else ["from, %", "to, %"]
+    ends = [] if brief else ["from, %", "to, %"]
     counts = [] if brief else ["better", "worse", *(["effective"] if unit == "frames" else [])]
     others = [f"{rate}, pp" for rate in OTHERS]
     return Table(
-        ["difference", *about, "ERR, pp", "interval, pp", *others, *counts],
+        ["difference", *ends, "ERR, pp", "interval, pp", *others, *counts],
         rows,
         breaks=[place for place, (a, b) in enumerate(pairwise(effects), 1) if a.base != b.base],
         groups=[("", 1), ("ERR", 4), ("", len(OTHERS)), (unit, len(counts))] if counts else (),
@@ -149,41 +143,40 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
 
 
 def thresholds_table(curves: Totals, totals: Totals) -> Table:
-    """Tabulate AP and MaxF over all thresholds and ECE beside F1 of the mask as it is."""
+    """Tabulate AP and MaxF over all thresholds and ECE, beside F1 of the mask as it is."""
     rows: list[list[Cell | str]] = [
         [
             variant_cell(variant, [*totals]),
             stage,
-            percent(own["AP"]),
-            Cell(percent(own["MaxF"]), bold=True),
-            f"{own['threshold']:.5g}" if defined(own["threshold"]) else DASH,
-            percent(own.get("ECE")),
+            percent(curve["AP"]),
+            Cell(percent(curve["MaxF"]), bold=True),
+            f"{curve['threshold']:.5g}" if defined(curve["threshold"]) else DASH,
+            percent(curve.get("ECE")),
             percent(totals[variant][stage].get("pooled_F1")),
         ]
         for variant, stages in curves.items()
-        for stage, own in stages.items()
+        for stage, curve in stages.items()
     ]
     return Table(
         ["variant", "stage", "AP", "MaxF", "threshold", "ECE", "F1 as it is"],
         rows,
         text_columns=(0, 1),
-        caption="Percent, and the threshold from 0 to 1. Of road's probability: average precision "
-        "over all thresholds, the best F1 with its threshold, the expected calibration error, and "
-        "F1 of the mask as it is. " + " ".join(describe_overconfidence(curves)),
+        caption=" ".join((caption("thresholds"), *describe_overconfidence(curves))),
         small=True,
     )
 
 
 def cameras_table(facts: Facts) -> Table:
-    """Tabulate ERR of each camera's final masks, and the first difference within each."""
+    """Tabulate ERR of each camera's final masks, and the first difference within each camera."""
     names, masks = short_names([*facts.cameras]), [*facts.finals]
-    pairs = [(each.variant, each.base) for each in facts.final_effects[:1]]
+    pairs = [(effect.variant, effect.base) for effect in facts.final_effects[:1]]
     rows: list[list[Cell | str]] = []
-    for camera, own in facts.cameras.items():
-        known = {name: own.totals[name][stage][TESTED] for name, stage in own.finals.items()}
-        changes = {(e.variant, e.base): e.rates[TESTED] for e in own.final_effects}
-        row: list[Cell | str] = [names[camera], number(own.frames.evaluated)]
-        row += best_bold([known.get(name) for name in masks], higher=False)
+    for camera, of_camera in facts.cameras.items():
+        finals = of_camera.finals.items()
+        errors = {name: of_camera.totals[name][stage][TESTED] for name, stage in finals}
+        changes = {(e.variant, e.base): e.rates[TESTED] for e in of_camera.final_effects}
+        row: list[Cell | str] = [names[camera], number(of_camera.frames.evaluated)]
+        row += best_bold([errors.get(name) for name in masks], higher=False)
         for pair in pairs:
             change = changes.get(pair)
             row += [points(change.mean), marked_interval(change)] if change else [DASH, DASH]
@@ -192,8 +185,6 @@ def cameras_table(facts: Facts) -> Table:
     return Table(
         ["camera", "frames", *masks, *titles],
         rows,
-        caption="ERR of the final masks in percent, and its difference in percentage points with "
-        "the interval within the camera. Above, each camera counts the same, and frames that were "
-        "taken at the same time count once in an interval.",
+        caption=caption("cameras"),
         small=True,
     )

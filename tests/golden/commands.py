@@ -102,18 +102,18 @@ def run(name: str) -> dict[str, Any]:
 def _drawn() -> Iterator[list[str]]:
     """Describe every figure of the paper and every chart of a report that is drawn meanwhile."""
     figures: list[str] = []
-    save, set_ = Figure.savefig, blocks.Figure.as_json
+    savefig, as_json = Figure.savefig, blocks.Figure.as_json
 
-    def saved(figure: Figure, *given: Any, **options: Any) -> None:
-        save(figure, *given, **options)
+    def save(figure: Figure, *arguments: Any, **options: Any) -> None:
+        savefig(figure, *arguments, **options)
         figures.append(drawings.described(figure))
 
-    def on_paper(figure: blocks.Figure) -> dict[str, Any]:
+    def convert(figure: blocks.Figure) -> dict[str, Any]:
         figures.append(drawings.charted(figure))
-        return set_(figure)
+        return as_json(figure)
 
     with (
-        mock.patch.object(Figure, "savefig", saved),
-        mock.patch.object(blocks.Figure, "as_json", on_paper),
+        mock.patch.object(Figure, "savefig", save),
+        mock.patch.object(blocks.Figure, "as_json", convert),
     ):
         yield figures

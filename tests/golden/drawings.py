@@ -1,4 +1,4 @@
-"""What is drawn, as text: every line, bar, mark and picture with its numbers."""
+"""What is drawn, as text: every line, mark and picture with its numbers."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
-from matplotlib.patches import Rectangle
 
 from roadeval.report import blocks
 from roadeval.report.chart import Chart
-from roadeval.report.figures import Picture
+from roadeval.report.figures import FigurePicture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,45 +56,32 @@ def described(figure: Figure) -> str:
 def _words(figure: Figure) -> Iterator[str]:
     for text in figure.texts:
         yield f"  text {text.get_text()!r}"
-    for legend in (found for axes in figure.axes if (found := axes.get_legend())):
+    for legend in filter(None, (axes.get_legend() for axes in figure.axes)):
         yield f"  legend {legend.get_title().get_text()!r}"
-        # By its lines: Matplotlib draws copies of what it was given.
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
             yield f"  legend {text.get_text()!r}: {_look(handle)}"
 
 
 def _pictures(figure: Figure) -> Iterator[str]:
-    """The pictures that lie on the figure itself, with their places in shares of it."""
+    """The pictures of figure 2, with their places in shares of the figure."""
     for picture in figure.artists:
-        if isinstance(picture, Picture):
+        if isinstance(picture, FigurePicture):
             box = picture.box.transformed(figure.transFigure.inverted())
-            place = " ".join(f"{each:.3g}" for each in box.extents)
+            place = " ".join(f"{share:.3g}" for share in box.extents)
             pixels = np.asarray(picture.get_array())
             yield f"  picture of {pixels.shape} at {place}, mean {pixels.mean():.5g}"
 
 
 def _axes(axes: Axes) -> Iterator[str]:
-    for what in ("title", "xlabel", "ylabel"):
-        get = getattr(axes, f"get_{what}")
-        if text := get(loc="left") or get() if what == "title" else get():
-            yield f"{what} {text!r}"
+    for label in ("xlabel", "ylabel"):
+        if text := getattr(axes, f"get_{label}")():
+            yield f"{label} {text!r}"
     yield from _sides(axes)
     for line in axes.lines:
         yield f"line {_points(line.get_xdata(), line.get_ydata())}: {_look(line)}"
-    for patch in axes.patches:
-        if isinstance(patch, Rectangle):
-            place = (patch.get_x(), patch.get_y(), patch.get_width(), patch.get_height())
-            yield f"box {' '.join(f'{each:.4g}' for each in place)}: {_look(patch)}"
-    for area in axes.collections:
-        if isinstance(area, PolyCollection):
-            (path,) = area.get_paths()
-            yield f"area {_points(*path.vertices.T)}: {to_hex(area.get_facecolor()[0])}"
-    yield from _images(axes)
     for text in axes.texts:
-        box = text.get_bbox_patch()
-        edge = "" if box is None else f" in a box, {_look(box)}, edge {box.get_edgecolor()[3]:.2g}"
-        place = " ".join(f"{each:.4g}" for each in text.get_position())
-        yield f"text {text.get_text()!r} at {place}, size {text.get_size():.3g}{edge}"
+        x, y = text.get_position()
+        yield f"text {text.get_text()!r} at {x:.4g} {y:.4g}, size {text.get_size():.3g}"
 
 
 def _sides(axes: Axes) -> Iterator[str]:
@@ -111,20 +96,10 @@ def _sides(axes: Axes) -> Iterator[str]:
             yield f"{side} grid: {_look(grid[0])}"
 
 
-def _images(axes: Axes) -> Iterator[str]:
-    for image in axes.images:
-        pixels = np.ma.filled(np.ma.asarray(image.get_array(), float), np.nan)
-        known = pixels[~np.isnan(pixels)]
-        low, high = image.get_clim()
-        ends = " ".join(to_hex(image.cmap(share)) for share in (0.0, 0.5, 1.0))
-        scale = f", {low:.4g} to {high:.4g} as {ends}" if pixels.ndim == 2 else ""
-        yield f"image of {pixels.shape}, mean {known.mean():.5g}, {len(known)} known{scale}"
-
-
 def _look(artist: Any) -> str:
-    """An artist's colours, dash and mark."""
+    """The colours, dash and mark of a line."""
     parts = []
-    for name in ("color", "facecolor", "linestyle", "linewidth", "marker", "markerfacecolor"):
+    for name in ("color", "linestyle", "linewidth", "marker", "markerfacecolor"):
         value = getattr(artist, f"get_{name}", lambda: None)()
         if value is None or value in ("None", ""):
             continue

@@ -125,7 +125,7 @@ def unscored(number, role=Role.TRAINING):
 def rows_of(recording, path, component):
     """How many values each frame's row of an entity has: none where nothing is to be shown."""
     file, found = recording._file, {}
-    for place in file._places.get(path, ()):
+    for place in file.messages.get(path, ()):
         with file.path.open("rb") as opened:
             opened.seek(place.offset)
             _, batch = rrd_file.rows_of(opened.read(place.size))
@@ -153,7 +153,7 @@ def record(path, results, known=None, texts=None):
 
 def paths_of(recording):
     """The paths of all entities that hold something."""
-    return {*RrdFile(recording)._places}
+    return {*RrdFile(recording).messages}
 
 
 def rerun(*words):

@@ -78,7 +78,7 @@ def test_what_is_read_of_it_has_its_own_checksum_or_one_line_says_where_it_is_no
 
 def place_of(path, recording):
     """Where the first message of an entity lies, of frames if there are any."""
-    places = recording._file._places[path]
+    places = recording._file.messages[path]
     return min(places, key=lambda place: (place.span == ALWAYS, place.offset))
 
 
@@ -123,8 +123,8 @@ def test_each_part_is_checked_when_it_is_read(path, read, spoilt):
 
 def test_a_message_that_its_index_says_is_larger_than_the_file_takes_no_memory(recording):
     opened = Recording(recording.path)
-    places = opened._file._places["/truth"]
-    opened._file._places["/truth"] = [each._replace(size=1 << 62) for each in places]
+    places = opened._file.messages["/truth"]
+    opened._file.messages["/truth"] = [each._replace(size=1 << 62) for each in places]
     with pytest.raises(DamagedError, match="at /truth"):
         opened.truth(4)
 

@@ -96,13 +96,13 @@ def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine
 def test_a_viewer_that_is_late_is_asked_again():
     answers = iter([TimeoutError("Deadline expired"), TimeoutError("Deadline expired"), "drawn"])
 
-    def ask():
+    def request():
         answer = next(answers)
         if isinstance(answer, Exception):
             raise answer
         return answer
 
-    assert viewer.asked(ask) == "drawn"
+    assert viewer.ask(request) == "drawn"
 
 
 @pytest.mark.parametrize(
@@ -117,8 +117,8 @@ def test_a_viewer_that_never_answers_or_has_ended_is_told_in_one_line(failure, s
     clock = count(step=100)
     monkeypatch.setattr("time.monotonic", lambda: next(clock))
 
-    def ask():
+    def request():
         raise failure
 
     with pytest.raises(RecordingError, match=f"^{said}$"):
-        viewer.asked(ask)
+        viewer.ask(request)

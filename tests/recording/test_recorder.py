@@ -191,6 +191,8 @@ def recorded_with_too_little_room(path, limit):
         command, cwd=root, check=False, capture_output=True, text=True, timeout=60
     )
     assert "cannot be written any further: File too large" in done.stdout, done.stderr
+    # To free the stream would wait for Rerun's writer, and print this.
+    assert "previous sink" not in done.stderr
     assert not path.exists()
     assert len(list(path.parent.iterdir())) < 2
     return done.stdout.splitlines()[-1]

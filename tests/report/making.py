@@ -9,14 +9,14 @@ from functools import cached_property
 from pypdf import PdfReader
 
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.report.blocks import Cell, Details, Document
+from roadeval.report.blocks import Cell, Details, Report
 from roadeval.report.findings import Findings
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 
 
 def a_document(*blocks, title="street"):
     """A document of some blocks."""
-    return Document("kicker", title, "subtitle", "footer", blocks)
+    return Report(title, "subtitle", blocks, "kicker", "footer")
 
 
 def reader(content):

@@ -10,11 +10,11 @@ import pytest
 from roadeval.data import ERRORS, LayerKind, LayerSpec
 from roadeval.data.colours import MOST_ERRORS, NEVER_LABELLED, VERMILLION
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.report.chart import Chart, ChartKind, Level, Look, Series, looks_of_results, thinned
+from roadeval.report.chart import Chart, ChartKind, Level, Look, Series, looks_of_results, thin
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import DRAWN, MEAN
-from roadeval.report.drawing import Span, drawn, span_of_frames, ticks, values
-from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, painted
+from roadeval.report.drawing import AxisRange, place_chart, range_of_frames, ticks, values
+from roadeval.report.images import DARKEN, LayerImage, heat_map, jpeg, paint
 
 # --- Looks ----------------------------------------------------------------------------------------
 
@@ -53,7 +53,7 @@ def test_of_many_drives_the_worst_and_the_best_have_a_row():
     half = DRAWN // 2
     assert len(chart.names) == DRAWN + 1
     assert chart.names[half - 1 : half + 1] == [f"drive_{half + 4}", f"drive_{half - 1}"]
-    assert "Of all drives the 20 worst and the 20 best." in figure.caption
+    assert "The 20 worst and the 20 best of all drives." in figure.caption
 
 
 def series(x, y, look=None, **more):
@@ -65,7 +65,7 @@ def lines(*drawn_series, **more):
 
 
 def test_a_line_goes_through_its_points_from_the_top_down():
-    made = drawn(lines(series([0, 10], [0.0, 100.0])), Span(0, 10))
+    made = place_chart(lines(series([0, 10], [0.0, 100.0])), AxisRange(0, 10))
     (shape,) = made.shapes
     assert shape.runs == [[(0, 100), (100, pytest.approx(5.66, abs=0.001))]]
     assert shape.path == "M0 100L100 5.66"
@@ -74,7 +74,7 @@ def test_a_line_goes_through_its_points_from_the_top_down():
 
 def test_a_line_breaks_where_a_value_is_undefined():
     chart = lines(series([0, 1, 2], [1.0, math.nan, 1.0]))
-    made = drawn(chart)
+    made = place_chart(chart)
     assert len(made.shapes[0].runs) == made.shapes[0].path.count("M") == 2
     assert values(chart, made)["series"][0]["y"] == [1.0, None, 1.0]
 
@@ -82,11 +82,11 @@ def test_a_line_breaks_where_a_value_is_undefined():
 def test_charts_along_the_drive_share_one_range_and_others_have_none():
     windows, frames = lines(series([14.5, 84.5], [1, 1])), lines(series([10, 100], [1, 1]))
     named = lines(series([0, 900], [1, 1]), names=["svm", "post"])
-    span = span_of_frames([windows, frames, named])
+    span = range_of_frames([windows, frames, named])
     assert 5 < span.low < 10
     assert 100 < span.high < 105
-    assert drawn(windows, span).x == drawn(frames, span).x == span
-    assert drawn(named, span).x == Span(-0.3, 1.3)
+    assert place_chart(windows, span).x == place_chart(frames, span).x == span
+    assert place_chart(named, span).x == AxisRange(-0.3, 1.3)
 
 
 @pytest.mark.parametrize(
@@ -94,12 +94,12 @@ def test_charts_along_the_drive_share_one_range_and_others_have_none():
     [(0, 9, [0, 2.5, 5, 7.5]), (-1, 1, [-1, -0.5, 0, 0.5, 1]), (0, 0.03, [0, 0.01, 0.02, 0.03])],
 )
 def test_ticks_are_round_numbers_inside_the_range(low, high, expected):
-    assert ticks(Span(low, high), 4) == pytest.approx(expected)
+    assert ticks(AxisRange(low, high), 4) == pytest.approx(expected)
 
 
 def test_marks_have_their_value_and_interval_and_leave_out_what_is_undefined():
     own = series([0, 1], [2.0, math.nan], low=[1.0, math.nan], high=[4.0, math.nan])
-    made = drawn(Chart("ERR", ChartKind.MARKS, [own], names=["lit", "shadow"]))
+    made = place_chart(Chart("ERR", ChartKind.MARKS, [own], names=["lit", "shadow"]))
     first, second = made.rows
     assert [mark.text for mark in first.marks] == ["a: 2.00 % (1.00 to 4.00)"]
     assert second.marks == []
@@ -107,21 +107,21 @@ def test_marks_have_their_value_and_interval_and_leave_out_what_is_undefined():
 
 def test_a_level_lies_across_with_its_interval_and_belongs_to_the_values():
     chart = Chart("change", ChartKind.LINES, [series([0], [2.0])], level=Level("mean", 2, 1, 4))
-    made = drawn(chart)
+    made = place_chart(chart)
     high = 4 * 1.06
     assert made.level == pytest.approx(100 * (1 - 2 / high), abs=0.001)
     assert made.band == pytest.approx((100 * (1 - 4 / high), 300 / high), abs=0.002)
     assert values(chart, made)["level"] == {"name": "mean", "value": 2, "low": 1, "high": 4}
     plain = Chart("change", ChartKind.LINES, [series([0], [2.0])], level=Level("mean", 1))
-    assert drawn(plain).band is None
-    assert values(plain, drawn(plain))["level"]["low"] is None
+    assert place_chart(plain).band is None
+    assert values(plain, place_chart(plain))["level"]["low"] is None
 
 
 def test_of_a_long_drive_neighbours_are_averaged():
-    long = thinned(series(list(range(10)), [float(n) for n in range(10)]), most=5)
+    long = thin(series(list(range(10)), [float(n) for n in range(10)]), most=5)
     assert long.x == [0, 2, 4, 6, 8]
     assert long.y == [0.5, 2.5, 4.5, 6.5, 8.5]
-    assert thinned(long, most=5) is long
+    assert thin(long, most=5) is long
 
 
 GREY = np.full((2, 4, 3), 100, np.uint8)
@@ -129,7 +129,7 @@ GREY = np.full((2, 4, 3), 100, np.uint8)
 
 def test_a_class_has_its_colour_over_the_darkened_image_and_a_clear_one_none():
     labels = np.array([[0, 1, 2, 3], [4, 0, 0, 0]], np.uint8)
-    colours = painted(LayerImage("", GREY, ERRORS, labels))
+    colours = paint(LayerImage("", GREY, ERRORS, labels))
     assert colours[0, 0].tolist() == [100 * DARKEN] * 3
     red, green, blue, alpha = ERRORS.classes[2].rgba
     over = [np.rint(100 * DARKEN * (1 - alpha / 255) + c * alpha / 255) for c in (red, green, blue)]
@@ -138,7 +138,7 @@ def test_a_class_has_its_colour_over_the_darkened_image_and_a_clear_one_none():
 
 def test_a_map_of_numbers_spans_its_range_and_is_clipped_to_it():
     spec = LayerSpec("ndi", LayerKind.SCALAR, "NDI", value_range=(-1.0, 1.0))
-    colours = painted(LayerImage("", GREY, spec, np.array([[-9.0, -1.0, 1.0, 9.0]], np.float32)))
+    colours = paint(LayerImage("", GREY, spec, np.array([[-9.0, -1.0, 1.0, 9.0]], np.float32)))
     low, _, high, _ = colours[0].tolist()
     assert colours[0].tolist() == [low, low, high, high]
     assert sum(high) > sum(low)

@@ -15,13 +15,15 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from PIL import Image
+from pypdf import PdfReader
 
-from roadeval.report import figures
 from roadeval.report.figures import (
     CROWDED,
+    DPI,
     MARKED,
     RC,
-    Picture,
+    FigurePicture,
+    as_svg,
     error_rate,
     fp_fn_rate,
     road_masks,
@@ -66,14 +68,9 @@ def an_example(frame: int = 7, *, truth: bool = True) -> ExampleFrame:
     )
 
 
-def masks_of(examples: Sequence[ExampleFrame]) -> Figure:
-    return road_masks("drive", examples)
-
-
-def drawn(figure: Figure) -> Figure:
-    with rc_context(RC):
-        FigureCanvasSVG(figure)
-        figures.svg(figure)
+def draw(figure: Figure) -> Figure:
+    FigureCanvasSVG(figure)
+    as_svg(figure)
     return figure
 
 
@@ -85,27 +82,33 @@ def as_in_a_run():
 
 def texts(figure: Figure) -> str:
     legends = [legend for ax in figure.axes if (legend := ax.get_legend())]
-    written = [*figure.texts, *(each.get_title() for each in legends)]
-    return " ".join(text.get_text() for text in written)
+    titles = [legend.get_title() for legend in legends]
+    names = [name for legend in legends for name in legend.get_texts()]
+    return " ".join(text.get_text() for text in (*figure.texts, *titles, *names))
 
 
 def pictures(figure: Figure) -> list[list[np.ndarray]]:
     """The images of figure 2, row by row."""
-    rows = groupby(placed(figure), lambda each: each.box.y0)
-    return [[np.asarray(each.get_array()) for each in row] for _, row in rows]
-
-
-def placed(figure: Figure) -> list[Picture]:
-    return [each for each in figure.artists if isinstance(each, Picture)]
+    placed = [artist for artist in figure.artists if isinstance(artist, FigurePicture)]
+    rows = groupby(placed, lambda picture: picture.box.y0)
+    return [[np.asarray(picture.get_array()) for picture in row] for _, row in rows]
 
 
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
-    ax = drawn(fp_fn_rate("drive", table)).axes[1]
-    assert ax.texts[0].get_text() == "undefined on every frame"
+    fpr, fnr = draw(fp_fn_rate("drive", table)).axes
+    assert not fpr.texts
+    assert fnr.texts[0].get_text() == "undefined on every frame"
 
 
-def test_a_long_drive_is_drawn_as_means_of_rows() -> None:
+def test_variants_are_named_by_what_they_do() -> None:
+    names = texts(error_rate("drive", a_table(3, ["filtered", "blind", "n" * 100])))
+    assert "filtered: with the shadow filter" in names
+    assert "blind: never looks at the image" in names
+    assert "n" * 81 not in names
+
+
+def test_a_long_drive_is_drawn_as_means_of_rows_with_some_marks() -> None:
     table = a_table(3600)
     figure = error_rate("drive", table)
     *_, line = figure.axes[0].lines
@@ -118,8 +121,9 @@ def test_a_long_drive_is_drawn_as_means_of_rows() -> None:
 
 def test_a_frame_without_a_mask_is_faded_in_its_column() -> None:
     image, mask = np.full((4, 6, 3), 105, np.uint8), np.ones((4, 6), np.uint8)
-    given = ({"unfiltered": mask}, {"unfiltered": mask, "net": mask})
-    figure = masks_of([ExampleFrame(n, image, mask, own) for n, own in enumerate(given)])
+    masks = ({"unfiltered": mask}, {"unfiltered": mask, "net": mask})
+    examples = [ExampleFrame(n, image, mask, by_variant) for n, by_variant in enumerate(masks)]
+    figure = road_masks("drive", examples)
     assert [len(row) for row in pictures(figure)] == [4, 4]
     assert set(pictures(figure)[0][2].ravel().tolist()) == {225}
     assert "faded: there is no mask" in texts(figure)
@@ -136,25 +140,25 @@ def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
     assert small.image.shape[1] <= 400
     assert small.truth is not None
     assert set(np.unique(small.truth)) == {0, 1, 255}
-    figures = [masks_of([each]) for each in (small, large)]
+    figures = [road_masks("drive", [example]) for example in (small, large)]
     assert figures[0].get_figheight() == figures[1].get_figheight()
-    for mine, its in zip(*(pictures(figure)[0] for figure in figures), strict=True):
-        np.testing.assert_array_equal(mine, its)
+    for of_small, of_large in zip(*(pictures(figure)[0] for figure in figures), strict=True):
+        np.testing.assert_array_equal(of_small, of_large)
 
 
 def test_a_png_shows_what_matplotlib_would_save(tmp_path: Path) -> None:
     windows = a_table(3)
     write_figures(tmp_path, "drive", windows, [])
-    mine = Image.open(tmp_path / "fig3a_error_rate.png")
+    typst = Image.open(tmp_path / "fig3a_error_rate.png")
     content = BytesIO()
-    with rc_context(RC):
-        error_rate("drive", windows).savefig(content, format="png", dpi=200)
-    its = Image.open(content)
-    assert mine.size == its.size
-    assert mine.mode == "RGB" or mine.getextrema()[3] == (255, 255), "nothing shines through"
-    # Each draws the edges of letters in its own way; five pixels off gives 0.985 at most.
-    blurred = [cv2.GaussianBlur(np.asarray(i.convert("L"), float), (0, 0), 8) for i in (mine, its)]
-    assert np.corrcoef(*(each.ravel() for each in blurred))[0, 1] > 0.99
+    error_rate("drive", windows).savefig(content, format="png", dpi=DPI)
+    matplotlib = Image.open(content)
+    assert typst.size == matplotlib.size
+    assert typst.mode == "RGB" or typst.getextrema()[3] == (255, 255), "nothing shines through"
+    # The two draw the edges of letters differently; five pixels off gives 0.985 at most.
+    grey = [np.asarray(image.convert("L"), float) for image in (typst, matplotlib)]
+    blurred = [cv2.GaussianBlur(image, (0, 0), 8).ravel() for image in grey]
+    assert np.corrcoef(*blurred)[0, 1] > 0.99
 
 
 @pytest.fixture(scope="module")
@@ -172,6 +176,7 @@ def test_equal_results_give_equal_files(twice: list[list[Path]]) -> None:
 def test_a_pdf_holds_each_picture_once_and_as_jpeg(twice: list[list[Path]]) -> None:
     content = next(p for p in twice[0] if p.name == "fig2_masks.pdf").read_bytes()
     assert content.count(b"/DCTDecode") == len({"the camera", "the mask, thrice"})
+    assert len(PdfReader(BytesIO(content)).pages) == 1
 
 
 def test_without_rates_only_masks_are_drawn(tmp_path: Path) -> None:

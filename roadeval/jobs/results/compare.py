@@ -19,7 +19,7 @@ from roadeval.evaluation.tables import concatenate, finals, only, values_of, win
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
-from roadeval.report.pdf.typeset import pdf, write_file
+from roadeval.report.pdf.typeset import typeset, write_file
 from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
@@ -29,7 +29,7 @@ from roadeval.runtime.text import visible
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.report.blocks import Document
+    from roadeval.report.blocks import Report
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def write(compared: Compared, path: Path) -> Path:
     """
     match path.suffix.lower():
         case ".pdf":
-            content = pdf(_document(compared))
+            content = typeset(_document(compared))
         case ".html":
             content = as_page(compared)
         case ".md":
@@ -184,7 +184,7 @@ def as_page(compared: Compared) -> bytes:
     return page(_document(compared))
 
 
-def _document(compared: Compared) -> Document:
+def _document(compared: Compared) -> Report:
     from roadeval.report.comparison import document
 
     def command(result: str, frame: int) -> str:

@@ -21,7 +21,7 @@ from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame
-from roadeval.report.images import ExampleFrame, LayerImage, faded
+from roadeval.report.images import ExampleFrame, LayerImage, fade
 from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
 from roadeval.results.sentences import notes
 from roadeval.results.verdict import focus_of
@@ -191,7 +191,7 @@ class FramePicker:
         for name in (variant.name for variant in recording.variants[self._outcomes]):
             errors = self._result.layer(name, ERRORS.name, frame)
             if errors is None:
-                yield LayerImage(f"{name}: no mask", faded(image))
+                yield LayerImage(f"{name}: no mask", fade(image))
             else:
                 yield LayerImage(f"{name}: errors", image, ERRORS, errors)
 

@@ -13,11 +13,11 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import BYTES, FramePicker, browsed, evenly, strips_of
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.report.blocks import Document
+from roadeval.report.blocks import Report
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings
 from roadeval.report.page.render import page, write_page
-from roadeval.report.pdf.typeset import pdf, write_file
+from roadeval.report.pdf.typeset import typeset, write_file
 from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import leads_outside
@@ -59,7 +59,7 @@ def write_report(
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
     with holding(path, inputs=[source]):
         if path.suffix.lower() not in PAGES:
-            return write_file(path, pdf(document(findings_of(opened))))
+            return write_file(path, typeset(document(findings_of(opened))))
         return write_page(path, page_of(opened, on_progress))
 
 
@@ -73,7 +73,7 @@ def findings_of(result: Result) -> Findings | FleetFolder:
     return collect(result.drive)
 
 
-def page_of(result: Result, on_progress: OnProgress = ignore) -> Document:
+def page_of(result: Result, on_progress: OnProgress = ignore) -> Report:
     """Return the page of a result as a document, with its most telling frames."""
     findings = findings_of(result)
     if result.drive is None:

@@ -22,16 +22,17 @@ from roadeval.data.words import MINUS
 from roadeval.report.blocks import (
     Block,
     Cell,
-    Document,
     Heading,
     ImageFile,
     KeepTogether,
+    Report,
     Table,
     TableOfContents,
     plain,
 )
+from roadeval.report.captions import caption
 from roadeval.report.chart import Chart, legend
-from roadeval.report.drawing import drawn, span_of_frames, values
+from roadeval.report.drawing import place_chart, range_of_frames, values
 from roadeval.report.pdf.typeset import ReportError
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.runtime.files import put, writing
@@ -43,13 +44,13 @@ _SCRIPTS: Final = (
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
-def page(document: Document) -> bytes:
+def page(document: Report) -> bytes:
     """Return a document as a page in UTF-8; equal documents give equal bytes."""
     parts = [*document.parts()]
-    span = span_of_frames(part for part in parts if isinstance(part, Chart))
+    frames = range_of_frames(part for part in parts if isinstance(part, Chart))
     browsers = (part for part in parts if isinstance(part, FrameBrowser))
     variants = next((part.variants for part in browsers), ())
-    made = (
+    html = (
         _environment()
         .get_template("page.html")
         .render(
@@ -58,32 +59,26 @@ def page(document: Document) -> bytes:
             policy=_policy(),
             style=style(),
             script=script(),
-            drawn=lambda chart: drawn(chart, span),
+            place_chart=lambda chart: place_chart(chart, frames),
             legend=legend,
+            caption=caption,
             values=values,
             source=_source,
-            filled=_filled,
+            rows_of=_rows,
             variants=variants,
             variant_of=partial(_variant_of, variants),
             unknown=_unknown,
         )
     )
-    return str(made).encode("utf-8")
+    return str(html).encode("utf-8")
 
 
 @cache
 def _policy() -> str:
-    """Return the content security policy: nothing but the page's own parts."""
-    return "; ".join(
-        [
-            "default-src 'none'",
-            "img-src data:",
-            f"style-src {_hash(style())}",
-            f"script-src {_hash(script())}",
-            "base-uri 'none'",
-            "form-action 'none'",
-        ]
-    )
+    """Return the content security policy: it allows only the page's own parts."""
+    parts = "default-src 'none'; img-src data:; style-src {}; script-src {}"
+    own_parts = parts.format(_hash(style()), _hash(script()))
+    return f"{own_parts}; base-uri 'none'; form-action 'none'"
 
 
 @cache
@@ -111,8 +106,8 @@ def _hash(code: str) -> str:
 def _variant_of(variants: Sequence[str], text: Cell | str) -> str:
     """Return the variant that a text begins with, as "a", "a: its mask" or a difference from a."""
     words = plain(text)
-    whole = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
-    return next(whole, "")
+    names = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
+    return next(names, "")
 
 
 @cache
@@ -120,20 +115,15 @@ def _environment() -> Any:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     templates = files("roadeval.report.page").joinpath("templates")
-    made = Environment(
+    environment = Environment(
         autoescape=True,
         undefined=StrictUndefined,
         loader=FunctionLoader(lambda name: templates.joinpath(name).read_text("utf-8")),
         trim_blocks=True,
-        finalize=_shown,
+        finalize=lambda value: visible(value) if type(value) is str else value,
     )
-    made.filters["tojson_text"] = lambda value: json.dumps(value, separators=(",", ":"))
-    return made
-
-
-def _shown(value: Any) -> Any:
-    """Return a text as `roadeval.runtime.text.visible` does; anything else as it is."""
-    return visible(value) if type(value) is str else value
+    environment.filters["tojson_text"] = lambda value: json.dumps(value, separators=(",", ":"))
+    return environment
 
 
 def _source(image: ImageFile | bytes) -> str:
@@ -144,16 +134,16 @@ def _source(image: ImageFile | bytes) -> str:
 
 @dataclass(frozen=True)
 class _Row:
-    """A row's cells, each with whether it repeats the one above, and its classes."""
+    """The cells of a row, with whether each repeats the cell above, and the row's classes."""
 
     cells: Sequence[tuple[Cell | str, bool]]
     classes: str
 
 
-def _filled(table: Table) -> Iterator[_Row]:
-    """Yield a table's rows; a word that is left out, as it is that of the row above, is there.
+def _rows(table: Table) -> Iterator[_Row]:
+    """Yield a table's rows; an omitted word is the word of the row above.
 
-    So a row means the same wherever sorting puts it.
+    So a row keeps its meaning when the table is sorted.
     """
     above: dict[int, Cell | str] = {}
     for place, row in enumerate(table.rows):
@@ -174,14 +164,14 @@ def _unknown(kind: str) -> NoReturn:
 
 @dataclass(slots=True)
 class Section:
-    """A heading of the first level with all that follows it."""
+    """A heading of the first level with the blocks below it."""
 
     name: str
-    """Of the place, for links; no two are equal."""
+    """The unique name that links use."""
     title: str
-    """Of the heading; empty before the first one."""
+    """The text of the heading; empty before the first heading."""
     blocks: list[tuple[Block, str]] = field(default_factory=list)
-    """What follows, with the names of the headings among them."""
+    """The blocks below, each with its name if it is a heading."""
 
     @property
     def parts(self) -> list[tuple[str, str]]:
@@ -190,32 +180,32 @@ class Section:
 
 
 def sections(blocks: Iterable[Block]) -> list[Section]:
-    """Return the sections of a document; blocks that are kept together are taken apart.
+    """Return the sections of a document, without the grouping that paper needs.
 
     >>> [section.name for section in sections([Heading("The frames"), Heading("The frames")])]
     ['the-frames', 'the-frames-2']
     """
-    found = [Section("", "")]
+    parts = [Section("", "")]
     taken: set[str] = set()
     for block in _flat(blocks):
         name = _name(block.text, taken) if isinstance(block, Heading) else ""
         if isinstance(block, Heading) and block.level == 1:
-            found.append(Section(name, block.text))
+            parts.append(Section(name, block.text))
         else:
-            found[-1].blocks.append((block, name))
-    return [section for section in found if section.title or section.blocks]
+            parts[-1].blocks.append((block, name))
+    return [section for section in parts if section.title or section.blocks]
 
 
 def _flat(blocks: Iterable[Block]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, KeepTogether):
             yield from _flat(block.blocks)
-        elif not isinstance(block, TableOfContents):  # a page's outline is always there
+        elif not isinstance(block, TableOfContents):  # a page always has an outline
             yield block
 
 
 def _name(text: str, taken: set[str]) -> str:
-    """Return a name of letters, digits and hyphens that nothing on the page has yet."""
+    """Return a name of letters, digits and hyphens that is new on the page."""
     plain = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
     name, count = plain, 1
     while name in taken:
@@ -225,7 +215,7 @@ def _name(text: str, taken: set[str]) -> str:
     return name
 
 
-def write_page(path: Path, document: Document) -> Path:
+def write_page(path: Path, document: Report) -> Path:
     """Write a document as a page; a `ReportError` if it cannot be written."""
     with writing(path, partial(ReportError, remedy="choose another place")):
         put(path, page(document))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, first_of, number, percent, points
@@ -13,6 +13,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import BASES, Effect
 from roadeval.evaluation.tables import only, values_of
 from roadeval.report.blocks import Block, Cell, Details, Heading, ImageFile, ImageGrid, Table, Text
+from roadeval.report.captions import caption, note
 from roadeval.report.charts.standard import forest
 from roadeval.results.facts import StratumFacts
 from roadeval.results.fleet import FleetFolder
@@ -26,52 +27,46 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NAMED: Final = 12
-"""Drives in the table of the worst, and in that of losses; reasons that are listed."""
+"""Most drives in the table of the worst, and most reasons in a table of missing ones."""
 OF_ONE_REASON: Final = 4
-"""Drives named for one reason."""
+"""Most drives that are named for one reason."""
 TAGS: Final = 48
-"""Letters of a drive's tags, at most."""
+"""Most letters of a drive's tags."""
 _WORDS: Final = ("drive", "state", "group", "tags")
 _SHOWN: Final = (TESTED, "FPR", "FNR")
 
 
 def plots(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the plots of the filter and of the best variant against blind, and the worst drives."""
-    chosen = list(plotted(findings))
+    """Yield the effects of the filter and of the best variant on each drive; the worst drives."""
     if findings.focus_scores.empty:
         return
     yield Heading("Drive by drive")
-    for place, (effect, title) in enumerate(chosen):
-        plot = [*_plot(findings, effect)]
-        yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
-    units = Text("Percent; the differences in percentage points.", "note")
-    yield Details("Drives with the highest error rate", [drives_table(findings, NAMED), units])
-
-
-def plotted(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
-    """Yield the differences that have a plot: of the filter, and of the best against blind."""
-    known = [each for each in findings.facts.effects if each.rates[TESTED].units]
-    for each in known:
-        if (each.base, each.variant) == (UNFILTERED, FILTERED):
-            yield each, "What the filter changes"
-    blind = [each for each in known if each.base == BASELINE]
-    if blind:
-        best = min(blind, key=lambda each: each.rates[TESTED].mean)
-        which = "" if len(blind) == 1 else ", the best variant,"
-        yield best, f"What {best.variant}{which} gains over {best.base}"
-
-
-def _plot(findings: FleetFolder, effect: Effect) -> Iterator[Block]:
-    rows = only(findings.effects, base=effect.base, variant=effect.variant)
-    if len(rows):
+    for place, (effect, title) in enumerate(main_effects(findings)):
+        rows = only(findings.effects, base=effect.base, variant=effect.variant)
         groups = findings.drives["group"].reindex(rows["drive"]).to_numpy()
         rows = rows.assign(name=[findings.names[drive] for drive in rows["drive"]], group=groups)
         label = f"ERR of {effect.variant} minus that of {effect.base}"
-        yield forest(rows, effect.rates[TESTED], label)
+        plot = [forest(rows, effect.rates[TESTED], label)] if len(rows) else []
+        yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
+    blocks = [drives_table(findings, NAMED), note("units")]
+    yield Details("Drives with the highest error rate", blocks)
+
+
+def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
+    """Yield the effects of the filter and of the best variant against blind, with their titles."""
+    effects = [effect for effect in findings.facts.effects if effect.rates[TESTED].units]
+    for effect in effects:
+        if (effect.base, effect.variant) == (UNFILTERED, FILTERED):
+            yield effect, "What the filter changes"
+    against_blind = [effect for effect in effects if effect.base == BASELINE]
+    if against_blind:
+        best = min(against_blind, key=lambda effect: effect.rates[TESTED].mean)
+        which = "" if len(against_blind) == 1 else ", the best variant,"
+        yield best, f"What {best.variant}{which} gains over {best.base}"
 
 
 def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
-    """Return by base the differences by drive of the focus, or the first variant that has any."""
+    """Return the differences of each drive by base: of the focus, if it has any, or of another."""
     differences = {}
     for base in BASES:
         rows = only(findings.effects, base=base)
@@ -82,35 +77,27 @@ def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
     return differences
 
 
-def _tags(findings: FleetFolder) -> dict[str, str]:
-    """Return the drives' tags in one line each, cut where they are many."""
-    lines = {
-        each.drive: ", ".join(f"{key}: {value}" for key, value in each.tags.items())
-        for each in findings.facts.drives
-    }
-    return {
-        drive: text if len(text) <= TAGS else f"{text[: TAGS - 1]}\N{HORIZONTAL ELLIPSIS}"
-        for drive, text in lines.items()
-    }
-
-
 def table(findings: FleetFolder) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
     yield replace(drives_table(findings), find="Find drives, tags, states:")
-    yield Text(
-        f"Rates of {focus_of(findings.finals)} in percent, differences in percentage points. A "
-        "click on a title sorts.",
-        "note",
-    )
+    yield note("sorted drives", variant=focus_of(findings.finals))
 
 
 def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     """Tabulate every drive with its state, its rates and its tags.
 
-    Or the ``worst`` ones, those with the highest ERR, without state and group.
+    A table of so many ``worst`` drives, with the highest ERR, has no state and no group.
     """
-    scores, tags, rows = findings.focus_scores, _tags(findings), findings.drives
+    scores, rows = findings.focus_scores, findings.drives
+    lines = {
+        drive.drive: ", ".join(f"{key}: {value}" for key, value in drive.tags.items())
+        for drive in findings.facts.drives
+    }
+    tags = {
+        drive: text if len(text) <= TAGS else f"{text[: TAGS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        for drive, text in lines.items()
+    }
     if worst is not None:
         ranked = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
         rows = rows.loc[ranked.index[:worst]]
@@ -123,8 +110,8 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
         **{r: [Cell(percent(rate), bold=r == TESTED) for rate in scores[r]] for r in _SHOWN},
         **{
-            f"against {base}": [*map(points, own.reindex(rows.index))]
-            for base, own in _differences(findings).items()
+            f"against {base}": [*map(points, changes.reindex(rows.index))]
+            for base, changes in _differences(findings).items()
         },
     }
     if worst is not None:
@@ -148,15 +135,15 @@ def missing(findings: FleetFolder) -> Iterator[Block]:
     }
     if any(map(len, parts.values())):
         yield Heading("What is missing")
-    for title, own in parts.items():
-        if len(own):
-            yield Heading(f"{title}: {number(len(own))}", 2)
-            yield from _reasons(findings, own)
+    for title, rows in parts.items():
+        if len(rows):
+            yield Heading(f"{title}: {number(len(rows))}", 2)
+            yield from _reasons(findings, rows)
 
 
 def _reasons(findings: FleetFolder, rows: pd.DataFrame) -> Iterator[Block]:
-    """Yield a table of reasons, the most frequent first."""
-    ranked = sorted(by_reason(findings, rows).items(), key=lambda each: -len(each[1]))
+    """Tabulate the drives by reason, the most frequent reason first."""
+    ranked = sorted(by_reason(findings, rows).items(), key=lambda reason: -len(reason[1]))
     yield Table(
         ["drives", "which", "reason"],
         [
@@ -168,13 +155,13 @@ def _reasons(findings: FleetFolder, rows: pd.DataFrame) -> Iterator[Block]:
     )
     if len(ranked) > NAMED:
         more = sum(len(names) for _, names in ranked[NAMED:])
-        yield Text(f"{number(more)} more for other reasons: see drives.parquet.", "note")
+        yield note("further reasons", count=number(more))
 
 
 def by_reason(findings: FleetFolder, rows: pd.DataFrame) -> dict[str, list[str]]:
-    """Return the drives' names by what was lost first, or by why they failed or were not scored.
+    """Return the drives' names by their first loss, or by why they failed or have no score.
 
-    Without the name of the drive's file, which begins most reasons.
+    Reasons are without the name of the drive's file, with which most of them begin.
     """
     drives: defaultdict[str, list[str]] = defaultdict(list)
     for drive, row in zip(rows.index, records(rows), strict=True):
@@ -189,33 +176,29 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
     """Yield a table of parts by tag for each difference that has a plot."""
     if findings.facts.strata:
         yield Heading("By tag")
-    for effect, title in plotted(findings):
+    for effect, title in main_effects(findings):
         mask = (effect.base, effect.variant)
-        own = [each for each in findings.facts.strata if (each.base, each.variant) == mask]
-        begins = [place for place, part in enumerate(own) if part.tag != own[place - 1].tag]
-        parts = Table(
+        parts = [part for part in findings.facts.strata if (part.base, part.variant) == mask]
+        begins = [place for place, part in enumerate(parts) if part.tag != parts[place - 1].tag]
+        table = Table(
             ["by", "value", "drives", "mean", "interval", "worse", "better"],
             [
                 [part.tag if place in (0, *begins) else "", *_part_cells(part)]
-                for place, part in enumerate(own)
+                for place, part in enumerate(parts)
             ],
             text_columns=(0, 1),
             breaks=[place for place in begins if place],
             small=True,
         )
-        count = max((each.difference.comparisons or 0 for each in own), default=0)
-        note = (
-            f"{MARK} significant after Holm's correction for the {count} parts that were tested "
-            "together."
-            if count
-            else "No part has enough drives, or groups of them, for an interval."
-        )
-        if own:
-            told = Text(f"Percentage points, means over drives. {note}", "note")
-            yield Details(title, [parts, told])
+        count = max((part.difference.comparisons or 0 for part in parts), default=0)
+        name = "tested strata" if count else "untested strata"
+        if parts:
+            tested = caption(name, mark=MARK, count=count)
+            yield Details(title, [table, note("strata", tested=tested)])
 
 
 def _part_cells(part: StratumFacts) -> list[Cell | str]:
+    """Return a part's cells: its value, drives, mean, interval, and worse and better drives."""
     change = part.difference
     return [
         part.value,
@@ -227,20 +210,21 @@ def _part_cells(part: StratumFacts) -> list[Cell | str]:
 
 
 WORST_AT: Final = "#the-worst-frames-over-all-drives"
-"""Address of the worst frames on the page of a fleet: their heading."""
+"""The address of the worst frames' heading on the page of a fleet."""
 SEEN: Final = 12
-"""Pictures that a page shows at once."""
-ACROSS = 4
-LONGEST = 20
-"""Letters of a drive's name below a picture."""
+"""Most pictures that a page shows at once."""
+ACROSS: Final = 4
+LONGEST: Final = 20
+"""Most letters of a drive's name below a picture."""
 
 
 def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iterator[Block]:
-    """Yield the worst frames, at most so many, and so many pictures beside each other."""
+    """Yield the worst frames: at most so many, with so many pictures beside each other."""
     rows = records(findings.worst[:most])
     if not rows:
         return
-    yield Heading(f"The worst frames of {focus_of(findings.finals)} over all drives")
+    focus = focus_of(findings.finals)
+    yield Heading(f"The worst frames of {focus} over all drives")
     pictures = []
     for row in rows:
         title = f"{elide(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
@@ -251,20 +235,11 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
         yield ImageGrid(pictures[:SEEN], across)
     if more := pictures[SEEN:]:
         yield Details(f"{len(more)} more", [ImageGrid(more, across)])
-    legend = (
-        f"By ERR of {focus_of(findings.finals)}; of a drive at most three, a second apart. "
-        "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
-        "grey: ignored."
-    )
+    legend = caption("worst frames of drives", variant=focus, errors=caption("errors"))
     if lacking := len(rows) - len(pictures):
-        legend += f" Not in the folder: {counted(lacking, 'picture')}."
+        legend += f" {caption('missing pictures', pictures=counted(lacking, 'picture'))}"
     yield Text(legend, "note")
-    yield _commands_table(findings, rows)
-
-
-def _commands_table(findings: FleetFolder, rows: Sequence[dict[str, Any]]) -> Table:
-    """Tabulate the worst frames with the command that opens each in the viewer."""
-    return Table(
+    yield Table(
         ["", "drive", "frame", "ERR, %", "in the viewer"],
         [
             [

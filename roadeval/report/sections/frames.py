@@ -1,4 +1,4 @@
-"""Frames to look at: in a report the worst and the most changed ones, on a page all."""
+"""Frames to look at: the worst and the most changed ones in a report, all on a page."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from roadeval.report.blocks import (
     Text,
     TwoColumns,
 )
+from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
@@ -35,36 +36,31 @@ SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
 LEAST: Final = 4
 MOST: Final = 6
-"""Pictures of outcomes that have room beside each other, at least and at most."""
-
-NO_COMMAND: Final = (
-    "No command opens them in the viewer, for the recording of this run is not where it was "
-    "written; a report of the recording names one for each."
-)
+"""Least and most pictures of outcomes beside each other."""
 
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
-    """Yield the worst frames with all their layers, then those that the filter changed most."""
+    """Yield the worst frames with all their layers, and the frames that the filter changed most."""
     focus = focus_of(findings.finals)
     if focus is None:
-        if (found := findings.facts.unlabelled) and found.sign:
-            rule = f"Highest {found.sign} of {found.variant}: {SIGNS[found.sign]}. One a scene."
-            head = [Heading("Frames to look at"), Text(f"{rule} No error rate is known.", "note")]
-            yield from _frames(findings, head, findings.worst)
+        if (doubt := findings.facts.unlabelled) and doubt.sign:
+            meaning = SIGNS[doubt.sign]
+            rule = note("frames in doubt", sign=doubt.sign, variant=doubt.variant, meaning=meaning)
+            yield from _frames(findings, [Heading("Frames to look at"), rule], findings.worst)
         return
     if not findings.worst:
         yield Heading(f"The worst frames of {focus}")
-        yield Text(f"ERR of {focus} is undefined on every frame, so no frame is the worst.")
-    rule = f"Highest ERR of {focus}; of a scene only the worst, above the mean."
+        yield Text(caption("no worst frame", variant=focus))
+    rules = [caption("worst frames", variant=focus)]
     rows = (row for frame in findings.worst for row in frame.layers if row)
-    if stepped := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
-        rule += f" Below the errors are the steps of {listing(stepped)}, from left to right."
-    head = [Heading(f"The worst frames of {focus}"), Text(rule, "note")]
+    if variants := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
+        rules.append(caption("stages of worst frames", variants=listing(variants)))
+    head = [Heading(f"The worst frames of {focus}"), Text(" ".join(rules), "note")]
     if not findings.inspect:
-        head.append(Text(NO_COMMAND, "note"))
+        head.append(note("no command"))
     yield from _frames(findings, head, findings.worst)
     helped = Heading("Frames that the filter helped most", 2)
-    # Those among the worst are above already.
+    # Harmed frames may be among the worst, which are above already.
     harmed = Heading("Further frames that the filter harmed most", 2)
     yield from _frames(findings, [helped], findings.helped)
     yield from _frames(findings, [harmed], findings.harmed)
@@ -73,7 +69,7 @@ def worst_frames(findings: Findings) -> Iterator[Block]:
 def _frames(
     findings: Findings, head: Sequence[Block], frames: Sequence[NotableFrame]
 ) -> Iterator[Block]:
-    """Yield frames below a heading, which is on the page of the first of them."""
+    """Yield frames below a heading, which is on the page of the first frame."""
     for place, frame in enumerate(frames):
         yield KeepTogether([*(head if place == 0 else ()), *notable_frame(findings, frame)])
 
@@ -82,7 +78,7 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     """Yield a frame with its sentences, rates and pictures."""
     stamp, *facts = sentences_about(frame)
     if frame.change is not None:
-        facts = [f"The filter changes ERR by {points(frame.change)} pp."]
+        facts = [caption("changed by the filter", change=points(frame.change))]
     elif notes := _notes(frame):
         facts[-len(notes) :] = [" ".join(notes)]
     sentences = [Text(sentence, "note") for sentence in (stamp, *facts)]
@@ -105,7 +101,7 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
 
 
 def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
-    """Tabulate the rates of each variant's final mask; ``variants`` are all that were scored."""
+    """Tabulate the rates of each variant's final mask; ``variants`` are all scored variants."""
     rows = [
         [
             variant_cell(name, variants),
@@ -120,7 +116,7 @@ def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
 
 
 def sentences_about(frame: NotableFrame) -> Iterator[str]:
-    """Yield when it was, which stage its error comes from, and its notes."""
+    """Yield a frame's stamp, the stages that its error comes from, and its notes."""
     yield f"Stamp {timestamp(frame.stamp_ns)}"
     if len(frame.parts) > 1:
         parts = {name: in_percent(part) for name, part in frame.parts.items()}
@@ -129,7 +125,7 @@ def sentences_about(frame: NotableFrame) -> Iterator[str]:
 
 
 def _notes(frame: NotableFrame) -> list[str]:
-    """Return a frame's notes, without that on the filter where the parts of its error have it."""
+    """Return a frame's notes, without the filter's if the parts of its error tell it."""
     return without_filter(frame.notes) if len(frame.parts) > 1 else [*frame.notes]
 
 
@@ -137,41 +133,41 @@ LARGE_ON_PAGE: Final = 640
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
-"""Frames in the table, at most; of a longer drive those with the highest error rate."""
+"""Most frames in the table; the table of a longer drive has those with the highest ERR."""
 
 
 @dataclass(frozen=True)
 class FrameBrowser(Block):
-    """The frames of a drive on a page: one with its pictures, and a table of all."""
+    """The frames of a drive on a page: pictures of one frame, and a table of all."""
 
     rows: Sequence[NotableFrame]
     """The frames of the drive, in order."""
     variants: Sequence[str]
-    """Those that were scored, or without truth are in doubt."""
+    """The variants that were scored, or without truth those with signs of doubt."""
     charts: Sequence[Chart]
     """Rates along the drive."""
     command: str = ""
-    """Opens a frame in the viewer, with ``{}`` for its number; empty without a recording."""
+    """The command that opens frame ``{}`` in the viewer; empty without a recording."""
     strips: Sequence[Strip] = ()
     """Frames with their pictures, in order."""
     masks: Sequence[str] = ()
-    """Names of the pictures of final masks, which are compared where there is no truth."""
+    """Names of the pictures of final masks, which are compared if there is no truth."""
     titles: Sequence[str] = ()
-    """The rates, or without truth the signs of doubt, of which each variant has a column."""
+    """The rates, or without truth the signs of doubt, with a column for each variant."""
 
     @property
     def pictured(self) -> frozenset[int]:
-        """The frames whose pictures can be had."""
+        """The frames that have pictures."""
         return frozenset(strip.frame for strip in self.strips)
 
     @property
     def shown(self) -> list[NotableFrame]:
-        """The frames of the table: all, or of a long drive the worst and the pictured."""
+        """The frames in the table: all, or of a long drive the worst and the pictured ones."""
         if len(self.rows) <= ROWS:
             return [*self.rows]
         ranked = sorted(self.rows, key=lambda row: -row.error)
-        wanted = {strip.frame for strip in self.strips} | {row.frame for row in ranked[:ROWS]}
-        return [row for row in self.rows if row.frame in wanted]
+        frames = self.pictured | {row.frame for row in ranked[:ROWS]}
+        return [row for row in self.rows if row.frame in frames]
 
     def cells(self, row: NotableFrame) -> Iterator[str]:
         """Yield a frame's seconds from the first one, and a number for each column of rates."""
@@ -182,19 +178,19 @@ class FrameBrowser(Block):
 
     @property
     def conditions(self) -> dict[str, int]:
-        """Return the conditions that frames have, in words, each with a number."""
-        words = dict.fromkeys(each for row in self.shown for each in row.conditions)
-        return {each: place for place, each in enumerate(words)}
+        """The conditions of frames in words, each with a number."""
+        words = dict.fromkeys(words for row in self.shown for words in row.conditions)
+        return {condition: place for place, condition in enumerate(words)}
 
     @property
     def first(self) -> int | None:
-        """The frame that is shown at first: the worst one with a picture; None without any."""
-        there = [row for row in self.rows if row.frame in self.pictured]
-        return max(there, key=lambda row: row.error).frame if there else None
+        """The frame that is shown at first: the worst one with pictures; None without any."""
+        pictured = [row for row in self.rows if row.frame in self.pictured]
+        return max(pictured, key=lambda row: row.error).frame if pictured else None
 
     @property
     def compared(self) -> tuple[str, str]:
-        """The pictures that are laid over each other: errors of two variants, or their masks."""
+        """The two pictures that lie over each other: errors of two variants, or their masks."""
         scored = self.variants if TESTED in self.titles else ()
         errors = [f"{name}: errors" for name in scored if name != BASELINE]
         first, *others = errors or [*self.masks] or ["camera"]
@@ -202,22 +198,23 @@ class FrameBrowser(Block):
 
     @property
     def note(self) -> str:
-        """Return what the table is of and what it leaves out, in sentences."""
-        told, of = [], number(len(self.rows))
+        """Sentences on the frames that the table leaves out, its unit, and missing pictures."""
+        sentences, frames = [], number(len(self.rows))
         if (shown := len(self.shown)) < len(self.rows):
-            told.append(
-                f"The {number(shown)} of {of} frames with the highest {next(iter(self.titles))}; "
-                f"{'frames' if TESTED in self.titles else 'unlabelled'}.csv has them all."
+            file = "frames" if TESTED in self.titles else "unlabelled"
+            count, rate = number(shown), self.titles[0]
+            sentences.append(
+                caption("frames in the table", shown=count, all=frames, rate=rate, file=file)
             )
         if self.variants:
-            told.append("Percent.")
+            sentences.append("Percent.")
         if 0 < len(self.strips) < len(self.rows):
-            told.append(f"{len(self.strips)} of {of} frames have their pictures on this page.")
-        return " ".join(told)
+            sentences.append(caption("pictured frames", pictured=len(self.strips), all=frames))
+        return " ".join(sentences)
 
 
 def browser(frames: FrameBrowser | None) -> Iterator[Block]:
-    """Yield the section of a page that browses the frames; nothing where there are none."""
+    """Yield the section of a page that browses the frames; nothing without frames."""
     if frames and frames.rows:
         yield Heading("Frames")
         yield frames
@@ -228,26 +225,27 @@ def strip(
 ) -> Strip:
     """Return a frame with its pictures, which are encoded here.
 
-    ``variants`` are all that were scored, for their colours; ``command`` opens the frame in the
-    viewer; the pictures of layers are at most ``layers`` pixels across.
+    ``variants`` are all scored variants, for their colours; ``command`` opens the frame in the
+    viewer; pictures of layers are at most ``layers`` pixels across.
     """
     return Strip(
         frame.frame,
         [*sentences_about(frame)],
         rates_of(frame, variants) if frame.rates else None,
-        list(_rows(frame, layers)),
+        list(_picture_rows(frame, layers)),
         command,
     )
 
 
-def _rows(frame: NotableFrame, layers: int) -> Iterator[list[Picture]]:
+def _picture_rows(frame: NotableFrame, layers: int) -> Iterator[list[Picture]]:
+    """Yield the pictures of outcomes, and of each variant's layers."""
     yield [_picture(image, image.title, LARGE_ON_PAGE) for image in frame.images]
     for row in frame.layers:
         variant = row[0].title.partition(":")[0] if row else ""
         names = [
             image.title if p == 0 else f"{variant}: {image.title}" for p, image in enumerate(row)
         ]
-        # Without truth the last mask is what is looked at.
+        # Without truth people look at the last mask.
         last = row[-1] if row and not frame.rates else None
         yield [
             _picture(image, name, LARGE_ON_PAGE if image is last else layers)

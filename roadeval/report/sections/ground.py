@@ -1,4 +1,4 @@
-"""What masks are worth in metres, where the camera is known."""
+"""Errors of masks in metres, for a known camera."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from roadeval.data.words import DASH, MINUS, defined, percent
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, RIGHT
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.captions import caption
 from roadeval.report.charts import standard as charts
 from roadeval.report.findings import Findings
 from roadeval.report.tables import variant_cell
 
 METRES: Final = "metres: "
-"""Begins the sentence on how the camera is known."""
+"""The beginning of the sentence on the source of the camera."""
 UNSURE: Final = "\N{ALMOST EQUAL TO}"
-"""Before a number that a wrong camera could explain."""
+"""The mark before a number that a wrong camera could explain."""
 KITTI: Final = (("MaxF", "F1"), ("AP11", ""), ("precision",) * 2, ("recall",) * 2)
-"""Measures of KITTI's benchmark, each with its counterpart of a mask without probabilities."""
-Row = Mapping[Any, Any]
+"""Measures of KITTI's benchmark, each with its counterpart for a mask without probabilities."""
+Measure = Mapping[Any, Any]
+"""A row of ``metres``."""
 
 
 def on_the_ground(findings: Findings) -> Iterator[Block]:
@@ -30,104 +32,88 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     if not rows:
         return
     yield Heading("On the ground, in metres")
-    yield Figure(
-        [charts.by_distance(findings.by_distance, names)],
-        "Error rate by distance ahead, means over the frames with "
-        f"{percent(findings.facts.evaluation.confidence, 0)} % intervals, of this drive only.",
-    )
+    confidence = percent(findings.facts.evaluation.confidence, 0)
+    legend = caption("by distance", confidence=confidence)
+    yield Figure([charts.by_distance(findings.by_distance, names)], legend)
     yield distance_table(rows, names)
     yield from edges_tables(rows, names)
-    (known,) = (each for each in findings.facts.drive.topics if each.startswith(METRES))
-    yield Text(f"The camera: {known.removeprefix(METRES)}. {_note(rows)}", "note")
+    (source,) = (topic for topic in findings.facts.drive.topics if topic.startswith(METRES))
+    flat = caption("camera", camera=source.removeprefix(METRES))
+    sway = caption("posed camera" if _is_posed(rows) else "homography", unfiltered=UNFILTERED)
+    yield Text(f"{flat} {sway}", "note")
 
 
-def _note(rows: Sequence[Row]) -> str:
-    told = "All of it holds on flat ground: a slope or a bump bends it."
-    if _is_posed(rows):
-        told += (
-            " As the camera stands: the range if it looked 1\N{DEGREE SIGN} further up or down, or "
-            f"stood 5 cm higher or lower, {DASH} where one of these would see none; {UNSURE}: that "
-            f"alone could explain the number, or its difference from {UNFILTERED}."
-        )
-    else:
-        told += " How far a wrong camera would move it is not known of a homography alone."
-    return told
+def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool = False) -> Table:
+    """Tabulate ERR by distance and by area of ground, and the measures of KITTI's benchmark there.
 
-
-def distance_table(rows: Sequence[Row], names: Sequence[str], *, brief: bool = False) -> Table:
-    """Tabulate ERR by distance and by area of ground, and what KITTI's benchmark measures there.
-
-    Below each variant's row stands the range of a camera that stands otherwise, where it is known.
-    A ``brief`` table has ERR alone.
+    Below each variant's row stands the range for a camera that stands otherwise, if it is known. A
+    ``brief`` table has ERR alone.
     """
-    errors = [row for row in rows if row["measure"] == TESTED]
-    places = list(dict.fromkeys(row["where"] for row in errors))
-    found = {(row["variant"], row["measure"], row["where"]): row for row in rows}
-    variants = [name for name in names if (name, TESTED, places[0]) in found]
+    places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == TESTED))
+    measures = {(row["variant"], row["measure"], row["where"]): row for row in rows}
+    variants = [name for name in names if (name, TESTED, places[0]) in measures]
     posed = _is_posed(rows)
     first = UNFILTERED if UNFILTERED in variants else variants[0]
     lines: list[list[Cell | str]] = []
     breaks, marked = [], False
     for variant in variants:
         breaks.append(len(lines))
-        own = [found[variant, TESTED, place] for place in places]
-        bases = [found[first, TESTED, place] for place in places]
-        effects = [abs(row["value"] - base["value"]) for row, base in zip(own, bases, strict=True)]
+        errors = [measures[variant, TESTED, place] for place in places]
+        bases = [measures[first, TESTED, place] for place in places]
         marks = [
-            UNSURE if variant != first and posed and _sway(row) > effect else ""
-            for row, effect in zip(own, effects, strict=True)
+            UNSURE
+            if variant != first and posed and _sway(row) > abs(row["value"] - base["value"])
+            else ""
+            for row, base in zip(errors, bases, strict=True)
         ]
         marked |= any(marks)
-        cells = [f"{m}{percent(row['value'], 1)}" for m, row in zip(marks, own, strict=True)]
+        cells = [f"{m}{percent(row['value'], 1)}" for m, row in zip(marks, errors, strict=True)]
         for most, plain in () if brief else KITTI:
-            row = found.get((variant, most, ABOVE)) or found.get((variant, plain, ABOVE), {})
+            row = measures.get((variant, most, ABOVE)) or measures.get((variant, plain, ABOVE), {})
             cells.append(percent(row.get("value"), 1))
         lines.append([variant_cell(variant, names), *cells])
-        if defined(own[0]["low"]):
-            ranges = [f"{percent(r['low'], 1)}{DASH}{percent(r['high'], 1)}" for r in own]
+        if defined(errors[0]["low"]):
+            ranges = [f"{percent(r['low'], 1)}{DASH}{percent(r['high'], 1)}" for r in errors]
             lines.append(["as the camera stands", *ranges, *[""] * (0 if brief else len(KITTI))])
-    heads = [charts.in_metres(each) for each in places if each != ABOVE]
-    caption = (
-        "Errors by distance, and on the ground seen from above, where each square metre counts once"
-    )
+    heads = [charts.in_metres(place) for place in places if place != ABOVE]
+    sentences = [caption("distances")]
     if not brief:
-        caption += "; MaxF of a mask without probabilities is its F1; AP11: over eleven recalls"
+        sentences.append(caption("measures of distance"))
     elif marked:
-        caption += f". {UNSURE}: a camera that stands a little otherwise could explain the "
-        caption += f"difference from {first}"
+        sentences.append(caption("unsure differences", first=first))
     return Table(
         ["ERR, %", *heads, "by area", *([] if brief else ["MaxF", "AP11", "prec.", "rec."])],
         lines,
         breaks=breaks[1:],
         groups=[("", 1), ("ahead", len(heads)), ("seen from above, %", 1 if brief else 5)],
-        caption=f"{caption}.",
+        caption=" ".join(sentences),
         small=True,
     )
 
 
-def _is_posed(rows: Sequence[Row]) -> bool:
-    """Return whether numbers were counted again as the camera might stand."""
+def _is_posed(rows: Sequence[Measure]) -> bool:
+    """Return whether the errors were counted again for other poses of the camera."""
     return any(defined(row["low"]) for row in rows)
 
 
-def _sway(row: Row) -> float:
-    """Return how far a wrong camera may move a number; infinitely where it may take it away."""
+def _sway(row: Measure) -> float:
+    """Return the change of a number by a wrong camera; infinite if that may take it away."""
     if not defined(row["low"]):
         return math.inf
     return float(max(row["high"] - row["value"], row["value"] - row["low"]))
 
 
-def edges_tables(rows: Sequence[Row], names: Sequence[str]) -> Iterator[Table]:
-    """Tabulate how far edges of the road, and its end ahead, lie from those of the truth."""
-    found = {(row["variant"], row["measure"], row["where"]): row for row in rows}
+def edges_tables(rows: Sequence[Measure], names: Sequence[str]) -> Iterator[Table]:
+    """Tabulate the distances of the road's edges, and of its end, from the truth's."""
+    measures = {(row["variant"], row["measure"], row["where"]): row for row in rows}
     places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == LEFT))
-    variants = [name for name in names if name != BASELINE and (name, FREE, "ahead") in found]
+    variants = [name for name in names if name != BASELINE and (name, FREE, "ahead") in measures]
     posed, breaks = _is_posed(rows), []
     lines: list[list[Cell | str]] = []
     for variant in variants:
         breaks.append(len(lines))
         for place in places:
-            sides = [found[variant, side, place] for side in (LEFT, RIGHT)]
+            sides = [measures[variant, side, place] for side in (LEFT, RIGHT)]
             if any(row["frames"] for row in sides):
                 head = variant_cell(variant, names) if len(lines) == breaks[-1] else ""
                 cells = (cell for row in sides for cell in _end(row, posed=posed))
@@ -139,29 +125,26 @@ def edges_tables(rows: Sequence[Row], names: Sequence[str]) -> Iterator[Table]:
             lines,
             breaks=breaks[1:],
             groups=[("", 2), ("left edge of the road", 4), ("right edge", 4)],
-            caption="Mask minus truth, positive where the mask reaches too far outwards: the "
-            "median, the 95th percentile of its size, and on how many of the frames on which the "
-            "truth has an edge there the mask has none.",
+            caption=caption("edges"),
             small=True,
         )
-    free = [found[name, FREE, "ahead"] for name in variants]
+    free = [measures[name, FREE, "ahead"] for name in variants]
     if any(row["frames"] for row in free):
         yield Table(
             ["free distance ahead, m", *columns],
             [[variant_cell(row["variant"], names), *_end(row, posed=posed)] for row in free],
-            caption="How far ahead the road ends, mask minus truth; both at the latest where the "
-            "truth is no longer known.",
+            caption=caption("free distance"),
             small=True,
         )
 
 
-def _end(row: Row, *, posed: bool) -> tuple[str, str, str, str]:
-    """Return the cells of a measure: its median, the range, the 95th percentile, the missing."""
+def _end(row: Measure, *, posed: bool) -> tuple[str, str, str, str]:
+    """Return the cells of an end of the road: median, range, 95th percentile, missing frames."""
     if not row["frames"]:
         return (DASH,) * 4
     unsure = posed and defined(row["value"]) and _sway(row) > abs(row["value"])
-    known = defined(row["low"])
-    span = f"{_metres(row['low'])} to {_metres(row['high'])}" if known else DASH
+    ends = (_metres(row[end]) for end in ("low", "high"))
+    span = " to ".join(ends) if defined(row["low"]) else DASH
     size = _metres(row["p95"]).lstrip("+")
     return (
         f"{UNSURE * unsure}{_metres(row['value'])}",

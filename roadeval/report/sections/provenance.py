@@ -1,4 +1,4 @@
-"""Sources of the results, and the command that makes them again; run.toml has the settings."""
+"""The sources of the results, and the command that makes them again; run.toml has the settings."""
 
 from __future__ import annotations
 
@@ -7,73 +7,75 @@ from typing import Any
 
 from roadeval.data.words import UNSET, setting
 from roadeval.report.blocks import Block, Command, Details, Heading, KeepTogether, Table, Text
+from roadeval.report.captions import caption, note
 from roadeval.report.findings import Findings
 from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 
 
 def section(findings: Findings) -> Iterator[Block]:
-    """Yield what was run on what, and how to run it again."""
+    """Yield the log, the methods and the command that makes the results again."""
     facts = findings.facts
     yield Heading("How to reproduce this")
     if facts.log:
         yield Text(f"Log: {facts.log.path}")
         yield Text(f"Digest of its index and checksums: {facts.log.digest}")
         if findings.again:
-            same = "The same log, configuration and versions give the same numbers."
-            yield KeepTogether([Command(findings.again), Text(same, "note")])
+            yield KeepTogether([Command(findings.again), note("reproduced")])
     for name, labels in facts.masks.items():
         yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
     yield from _methods(facts)
-    about: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
-    # The digest of the input says less than the log's checksum and the settings around it.
-    known = {n: value for n, value in findings.properties.items() if n != "input" and value != ""}
-    if known:
-        about.append(Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note"))
+    details: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
+    # The log's digest and the settings above tell more than the digest of the input.
+    properties = [
+        f"{name}: {value}"
+        for name, value in findings.properties.items()
+        if name != "input" and value != ""
+    ]
+    if properties:
+        details.append(Text("; ".join(properties), "note"))
     if facts.versions:
-        about.append(_words(["package", "version"], [*facts.versions.items()]))
+        details.append(_words(["package", "version"], [*facts.versions.items()]))
     if facts.seconds:
-        masks = ((v, stage, s) for v, own in facts.seconds.items() for stage, s in own.items())
-        seconds = [[variant, stage, f"{1e3 * value:.2f}"] for variant, stage, value in masks]
-        about.append(_words(["variant", "stage", "ms a frame"], seconds))
-    if about:
-        yield Details("Topics, versions, milliseconds", about, on_paper=False)
+        times = [
+            [variant, stage, f"{1e3 * seconds:.2f}"]
+            for variant, stages in facts.seconds.items()
+            for stage, seconds in stages.items()
+        ]
+        details.append(_words(["variant", "stage", "ms a frame"], times))
+    if details:
+        yield Details("Topics, versions, milliseconds", details, on_paper=False)
 
 
 def of_drives(findings: FleetFolder) -> Iterator[Block]:
-    """Yield what many drives were replayed with, and where its settings are."""
+    """Yield the version that has replayed many drives, and the files with its settings."""
     yield Heading("What was run")
-    yield Text(
-        f"roadeval {findings.facts.version}. run.toml in {findings.path} has the whole "
-        "configuration, drives.parquet each log's digest, and the model and the fold that scored "
-        "it. The same logs, configuration and version give the same numbers."
-    )
+    yield Text(caption("run of a fleet", version=findings.facts.version, folder=findings.path))
 
 
 def _methods(facts: Facts) -> Iterator[Block]:
-    """Yield what stages say of themselves, as networks do, with the time that each takes."""
+    """Yield the description that a stage, as a network, gives of itself, with its time."""
     for variant, stages in facts.methods.items():
-        for stage, about in stages.items():
-            seconds = facts.seconds.get(variant, {}).get(stage)
-            time = {} if seconds is None else {"ms a frame": f"{1e3 * seconds:.2f}"}
-            known = dict(flattened(about)) | time
-            rows = [[name, value] for name, value in known.items()]
-            yield Details(f"{variant}: {stage}", [_words(["what", "value"], rows)])
+        for stage, description in stages.items():
+            rows = dict(flatten(description))
+            if (seconds := facts.seconds.get(variant, {}).get(stage)) is not None:
+                rows["ms a frame"] = f"{1e3 * seconds:.2f}"
+            yield Details(f"{variant}: {stage}", [_words(["what", "value"], [*rows.items()])])
 
 
 def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Return a small table whose first two columns are words."""
+    """Return a small table with words in its first two columns."""
     return Table(columns, rows, text_columns=(0, 1), small=True)
 
 
-def flattened(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield settings that are set, by their dotted names.
+def flatten(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield settings that have a value, by their dotted names.
 
-    >>> list(flattened({"svm": {"kernel": "rbf"}, "size": [4, 3], "seed": None}))
+    >>> list(flatten({"svm": {"kernel": "rbf"}, "size": [4, 3], "seed": None}))
     [('svm.kernel', 'rbf'), ('size', '4, 3')]
     """
     for name, value in settings.items():
         if isinstance(value, Mapping):
-            yield from flattened(value, f"{prefix}{name}.")
+            yield from flatten(value, f"{prefix}{name}.")
         elif (text := setting(value)) != UNSET:
             yield f"{prefix}{name}", text

@@ -17,6 +17,7 @@ from roadeval.report.blocks import (
     TableOfContents,
     Text,
 )
+from roadeval.report.captions import caption, note
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
 from roadeval.report.sections.drives import WORST_AT
@@ -27,12 +28,7 @@ from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
 
 LOSSES: Final = 3
-"""Losses that are named."""
-PARTIAL: Final = (
-    "This run did not reach its end: the report covers the part of the recording that can be read."
-)
-
-
+"""Most losses that are named."""
 STATUSES: Final = {
     SCORED: "scored",
     DAMAGED: "scored but for what is lost",
@@ -52,7 +48,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
 
 def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
-        yield BulletList("Partial recording", [PARTIAL], "warning")
+        yield BulletList("Partial recording", [caption("partial")], "warning")
     yield Text(findings.facts.verdict, "verdict")
     for frame in findings.worst[:1]:
         title = f"First frame to look at: {frame.frame}"
@@ -66,14 +62,11 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     yield Text(account(findings.facts.frames, findings.facts.windows), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
-        legend = "Green: called road."
+        legend = caption("thumbnails without truth")
         for first in [*findings.finals][:1]:
-            legend = (
-                f"Errors of {first} across the drive. Green: road found; orange: non-road called "
-                "road (FP); purple: road missed (FN); grey: ignored."
-            )
+            legend = caption("thumbnails", variant=first, errors=caption("errors"))
         yield ImageGrid(pictures, 4, caption=legend)
-    yield _beware(list(warnings(findings)))
+    yield _beware([*warnings(findings)])
 
 
 def _of_drives(findings: FleetFolder) -> Iterator[Block]:
@@ -87,69 +80,64 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
         yield rates_table(facts)
     if facts.effects:
         yield differences_table(facts)
-        note = "Every drive counts the same, long or short; those of one group count as one, and "
-        yield Text(f"{note}so do copies of a log.", "note")
+        yield note("weights of drives")
     yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
-    yield _beware(list(fleet_warnings(findings)))
+    yield _beware([*fleet_warnings(findings)])
     yield TableOfContents()
 
 
-def _beware(warned: list[str]) -> BulletList:
-    return BulletList("Beware", warned or ["Nothing known."], "warning" if warned else "plain")
+def _beware(sentences: list[str]) -> BulletList:
+    """Return a list of warnings, or a line if there is none."""
+    tone = "warning" if sentences else "plain"
+    return BulletList("Beware", sentences or [caption("nothing known")], tone)
 
 
 def warnings(findings: Findings) -> Iterator[str]:
-    """Yield what a reader must know before believing the numbers of a drive."""
+    """Yield the reasons to doubt the numbers of a drive."""
     facts = findings.facts
     yield from facts.warnings
-    own = facts.training.model is None or facts.training.adapted
-    if facts.training.source == "truth" and own and findings.totals:
-        yield (
-            "Trained on frames of this drive (none of them is evaluated): the rates say how well "
-            "it does on a road that it has seen."
-        )
+    trained_here = facts.training.model is None or facts.training.adapted
+    if facts.training.source == "truth" and trained_here and findings.totals:
+        yield caption("trained on this drive")
     errors = {name: findings.total(name)[TESTED] for name in findings.finals}
     if worse := _worse_than_baseline(errors):
-        yield f"{worse}, which never looks at the image: nothing was gained from its pixels here."
+        yield caption("worse than blind", worse=worse)
     for variant in findings.finals:
         total = findings.total(variant)
-        if counts := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
-            of = number(total["frames"])
-            yield f"{variant}: of {of} frames, undefined and left out: {listing(counts)}."
+        if rates := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
+            frames, rates_named = number(total["frames"]), listing(rates)
+            yield caption("undefined rates", variant=variant, frames=frames, rates=rates_named)
     yield from (f"Lost: {loss}" for loss in facts.losses[:LOSSES])
     if len(facts.losses) > LOSSES:
-        yield f"{len(facts.losses) - LOSSES} more frames were lost; summary.json names them."
+        yield caption("more losses", count=len(facts.losses) - LOSSES)
     if not findings.pictured:
-        yield "Made without pictures (a results folder holds none): no gallery, no maps."
+        yield caption("no pictures")
 
 
 def _worse_than_baseline(errors: Mapping[str, float | None]) -> str:
     """Name the variants with a higher ERR than the baseline; empty without any."""
     blind = errors.get(BASELINE)
-    known = {name: error for name, error in errors.items() if defined(error) and defined(blind)}
-    worse = [name for name, error in known.items() if error > known[BASELINE]]
+    if not defined(blind):
+        return ""
+    worse = [name for name, error in errors.items() if defined(error) and error > blind]
     verb = "is" if len(worse) == 1 else "are"
     return f"{listing(worse)} {verb} worse than {BASELINE} (ERR {percent(blind)} %)" * bool(worse)
 
 
 def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
-    """Yield what a reader must know before believing the numbers of many drives."""
+    """Yield the reasons to doubt the numbers of many drives."""
     facts = findings.facts
     if failed := facts.counts.get(FAILED):
-        of = number(len(facts.drives))
-        yield f"{number(failed)} of {of} drives failed: no number counts them."
+        yield caption("failed drives", failed=number(failed), drives=number(len(facts.drives)))
     if damaged := facts.counts.get(DAMAGED):
-        yield f"{_were(damaged)} scored without what is lost of the log."
+        yield caption("damaged drives", drives=_were(damaged))
     drives = findings.drives
-    learnt = (drives["evaluated"] > 0) & (drives["trained_on"] > 0) & drives["model"].isna()
-    if own := int(learnt.sum()):
-        yield (
-            f"{_were(own)} scored by a model trained on the drive's own frames (none of "
-            "these is evaluated): the rates say how well it does on a road that it has seen."
-        )
+    trained_here = (drives["evaluated"] > 0) & (drives["trained_on"] > 0) & drives["model"].isna()
+    if count := int(trained_here.sum()):
+        yield caption("drives that trained their models", drives=_were(count))
     errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
     if worse := _worse_than_baseline(errors):
-        yield f"{worse}, which never looks at the image."
+        yield caption("worse than blind in a fleet", worse=worse)
     yield from (f"{sentence}." for sentence in facts.warnings)
 
 
@@ -158,7 +146,7 @@ def _were(count: int) -> str:
 
 
 def drives_account(counts: Mapping[str, int], frames: int) -> str:
-    """Return how many drives there are, by their states, and how many frames were evaluated."""
+    """Return the numbers of drives, by their states, and of evaluated frames."""
     states = (f"{number(counts[s])} {text}" for s, text in STATUSES.items() if counts.get(s))
     drives = counted(sum(counts.values()), "drive")
     return f"{drives}: {', '.join(states)}; {number(frames)} frames evaluated"

@@ -17,7 +17,7 @@ from roadeval.report.blocks import (
     Text,
 )
 from roadeval.report.chart import Chart, ChartKind, Level, Series, looks
-from roadeval.report.pdf.typeset import pdf
+from roadeval.report.pdf.typeset import typeset
 from tests.report.making import a_document, reader, text
 
 HOSTILE = '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw` [c] \\ // # = - "quoted" ${x}'
@@ -52,7 +52,7 @@ CHARTS = {
 @pytest.mark.parametrize("name", CHARTS)
 def test_every_kind_of_chart_is_drawn_with_its_words(name):
     chart = CHARTS[name]
-    content = pdf(a_document(Figure([chart, chart, chart], "What it shows.")))
+    content = typeset(a_document(Figure([chart, chart, chart], "What it shows.")))
     words = text(content)
     title = f"{chart.title}, {chart.unit}"
     wanted = [title, "What it shows.", *(k.name for k in chart.legend())]
@@ -83,20 +83,20 @@ def test_every_kind_of_chart_is_drawn_with_its_words(name):
     ids=lambda block: type(block).__name__,
 )
 def test_text_that_looks_like_markup_is_printed_as_it_is(block):
-    assert '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw`' in text(pdf(a_document(block)))
+    assert '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw`' in text(typeset(a_document(block)))
 
 
 def test_the_caption_of_pictures_is_on_their_page():
     for above in range(2, 8):
         pictures = ImageGrid([("one", a_png())] * 3, 2, caption="What they show")
         blocks = [Table(["n"], [[str(n)] for n in range(above * 6)], small=True), pictures]
-        pages = [page.extract_text() for page in reader(pdf(a_document(*blocks))).pages]
+        pages = [page.extract_text() for page in reader(typeset(a_document(*blocks))).pages]
         assert ["one" in words for words in pages] == ["What they show" in words for words in pages]
 
 
 def test_who_listens_to_a_document_is_told_what_each_part_is_and_what_pictures_show():
     table = Table(["variant", "ERR"], [["filtered", "1.00"]], caption="Rates")
-    made = reader(pdf(a_document(Heading("One"), table, Figure([a_chart("ERR")], ""))))
+    made = reader(typeset(a_document(Heading("One"), table, Figure([a_chart("ERR")], ""))))
     root = made.trailer["/Root"]
     assert root["/MarkInfo"]["/Marked"]
     assert root["/Lang"] == "en"

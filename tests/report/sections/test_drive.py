@@ -20,11 +20,12 @@ from roadeval.report.blocks import (
     TwoColumns,
     plain,
 )
+from roadeval.report.captions import caption
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
 from roadeval.report.sections.drive import filter_effect, regions, thresholds
-from roadeval.report.sections.frames import NO_COMMAND, FrameBrowser, strip, worst_frames
+from roadeval.report.sections.frames import FrameBrowser, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
 from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import rates_table
@@ -150,7 +151,7 @@ def said(blocks):
 def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is_told():
     (blocks,) = shown(some_findings(worst=[a_frame(7)], inspect=None))
     assert not [block for block in blocks if isinstance(block, Command)]
-    assert NO_COMMAND in [block.text for block in blocks if isinstance(block, Text)]
+    assert caption("no command") in [block.text for block in blocks if isinstance(block, Text)]
 
 
 def test_outcomes_are_at_most_640_pixels_across_and_layers_300():

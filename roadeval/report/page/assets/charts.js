@@ -2,7 +2,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const along = []; // The charts along the drive.
-const range = { whole: null, low: 0, high: 0, onChange: [] };
+const range = { drive: null, low: 0, high: 0, onChange: [] };
 
 function svg(name, attributes) {
   const made = document.createElementNS(SVG, name);
@@ -21,17 +21,17 @@ function nearest(numbers, value) {
   return Math.abs(numbers[low] - value) <= Math.abs(numbers[high] - value) ? low : high;
 }
 
-/** Round numbers in a range, about as many as asked for. */
+/** About so many round numbers in a range. */
 function roundNumbers(low, high, count) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = Math.max(1, power * [1, 2, 5, 10].find((each) => each * power >= rough));
-  const found = [];
-  for (let each = Math.ceil(low / step) * step; each <= high; each += step) found.push(each);
-  return found;
+  const step = Math.max(1, power * [1, 2, 5, 10].find((digit) => digit * power >= rough));
+  const numbers = [];
+  for (let number = Math.ceil(low / step) * step; number <= high; number += step) numbers.push(number);
+  return numbers;
 }
 
-/** The first line of what is told at the pointer. */
+/** The first line of the words at the pointer. */
 function tipHead(text) {
   const head = document.createElement("p");
   head.className = "head";
@@ -53,12 +53,12 @@ function tipLine(name, value, colour = null) {
   return line;
 }
 
-/** A value with its interval, where it has one. */
+/** A value with its interval, if it has one. */
 function withEnds(value, low, high, unit) {
   if (value === null || value === undefined) return "\u2013";
-  const told = (each) => `${unit === "pp" && each > 0 ? "+" : ""}${each.toFixed(2)}`.replace("-", "\u2212");
-  const known = typeof low === "number" && typeof high === "number";
-  return `${told(value)} ${unit}` + (known ? ` (${told(low)} to ${told(high)})` : "");
+  const written = (number) => `${unit === "pp" && number > 0 ? "+" : ""}${number.toFixed(2)}`.replace("-", "\u2212");
+  const hasEnds = typeof low === "number" && typeof high === "number";
+  return `${written(value)} ${unit}` + (hasEnds ? ` (${written(low)} to ${written(high)})` : "");
 }
 
 class ChartView {
@@ -73,13 +73,13 @@ class ChartView {
     this.tip.className = "tip";
     this.tip.hidden = true;
     this.area.append(this.here, this.cursor);
-    this.whole = document.createElement("button");
-    this.whole.type = "button";
-    this.whole.className = "whole";
-    this.whole.textContent = "Whole drive";
-    this.whole.hidden = true;
-    this.whole.addEventListener("click", () => zoom(...range.whole));
-    element.append(this.whole);
+    this.driveButton = document.createElement("button");
+    this.driveButton.type = "button";
+    this.driveButton.className = "whole";
+    this.driveButton.textContent = "Whole drive";
+    this.driveButton.hidden = true;
+    this.driveButton.addEventListener("click", () => zoom(...range.drive));
+    element.append(this.driveButton);
     element.append(this.tip);
     this.area.setAttribute("tabindex", "0");
     this.listen(onFrame);
@@ -122,7 +122,7 @@ class ChartView {
       const next = Math.min(Math.max(place + step, 0), numbers.length - 1);
       pointAt(this, numbers[next]);
     } else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
-    else if (event.key === "Escape" && this.values.frames) zoom(...range.whole);
+    else if (event.key === "Escape" && this.values.frames) zoom(...range.drive);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -130,11 +130,11 @@ class ChartView {
 
   /** All positions that have a value, in order. */
   numbers() {
-    this.known ??= [...new Set(this.values.series.flatMap((each) => each.x))].sort((a, b) => a - b);
-    return this.known;
+    this.positions ??= [...new Set(this.values.series.flatMap((series) => series.x))].sort((a, b) => a - b);
+    return this.positions;
   }
 
-  /** Where a position lies, in percent of the whole chart. */
+  /** The place of a position, in percent of the chart. */
   share(x) {
     const [first, last] = this.values.x;
     return (100 * (x - first)) / (last - first);
@@ -158,41 +158,41 @@ class ChartView {
     this.cursor.setAttribute("d", `M${this.share(this.pointed)} 0V100`);
   }
 
-  /** What stands at the position that is pointed at. */
+  /** The name of the position under the pointer. */
   where() {
     const { across, frames, names, unit } = this.values;
     if (frames) return `frame ${Math.round(this.pointed)}`;
     return across ? `${across} ${this.pointed.toFixed(2)} ${unit}` : names[Math.round(this.pointed)];
   }
 
-  /** The place of a series' value at the position; none where it has no value near it. */
-  placeIn(each) {
-    if (!each.x.length) return -1;
-    const place = nearest(each.x, this.pointed);
+  /** The place of a series' value at the position; -1 without a value near it. */
+  placeIn(series) {
+    if (!series.x.length) return -1;
+    const place = nearest(series.x, this.pointed);
     const near = this.values.across ? (this.high - this.low) / 50 : 0.5;
-    const far = Math.abs(each.x[place] - this.pointed) > near;
+    const far = Math.abs(series.x[place] - this.pointed) > near;
     return far && !this.values.frames ? -1 : place;
   }
 
-  series() {
-    return this.values.series.filter((each) => isShown(each.name));
+  shownSeries() {
+    return this.values.series.filter((series) => isShown(series.name));
   }
 
   tell() {
-    const [series, { unit, level }] = [this.series(), this.values];
-    const lines = series.map((each) => {
-      const place = this.placeIn(each);
-      const value = place < 0 ? null : each.y[place];
-      const left = value === null && series.length > 1 && (unit === "pp" || !this.values.frames);
-      return left ? null : tipLine(each.name, withEnds(value, each.low?.[place], each.high?.[place], unit), each.colour);
+    const [shown, { unit, level }] = [this.shownSeries(), this.values];
+    const lines = shown.map((series) => {
+      const place = this.placeIn(series);
+      const value = place < 0 ? null : series.y[place];
+      const isOmitted = value === null && shown.length > 1 && (unit === "pp" || !this.values.frames);
+      return isOmitted ? null : tipLine(series.name, withEnds(value, series.low?.[place], series.high?.[place], unit), series.colour);
     });
     if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
     this.tip.replaceChildren(tipHead(this.where()), ...lines.filter(Boolean));
     this.tip.hidden = false;
     const share = (this.pointed - this.low) / (this.high - this.low);
     const [left, width] = [this.area.getBoundingClientRect().left - this.element.getBoundingClientRect().left, this.area.clientWidth];
-    const wanted = left + share * width + (share > 0.6 ? -this.tip.offsetWidth - 10 : 10);
-    this.tip.style.left = `${Math.max(0, Math.min(wanted, this.element.clientWidth - this.tip.offsetWidth))}px`;
+    const best = left + share * width + (share > 0.6 ? -this.tip.offsetWidth - 10 : 10);
+    this.tip.style.left = `${Math.max(0, Math.min(best, this.element.clientWidth - this.tip.offsetWidth))}px`;
   }
 
   select(from, to) {
@@ -205,13 +205,13 @@ class ChartView {
 
   show(low, high) {
     [this.low, this.high] = [low, high];
-    this.whole.hidden = low === range.whole[0] && high === range.whole[1];
+    this.driveButton.hidden = low === range.drive[0] && high === range.drive[1];
     this.area.setAttribute("viewBox", `${this.share(low)} 0 ${this.share(high) - this.share(low)} 100`);
     const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
     this.element.querySelector(".xs").replaceChildren(
-      ...ticks.map((each) => {
-        const text = svg("text", { x: `${(100 * (each - low)) / (high - low)}%`, y: 14 });
-        text.textContent = each;
+      ...ticks.map((tick) => {
+        const text = svg("text", { x: `${(100 * (tick - low)) / (high - low)}%`, y: 14 });
+        text.textContent = tick;
         return text;
       }),
     );
@@ -222,10 +222,10 @@ class ChartView {
   }
 }
 
-/** Show the values at a position: in this chart as words, in all along the drive as a line. */
+/** Show the values at a position: words in this chart, a line in all charts along the drive. */
 function pointAt(view, x) {
-  const all = view.values.frames ? along : [view];
-  for (const each of all) each.point(x);
+  const views = view.values.frames ? along : [view];
+  for (const other of views) other.point(x);
   if (x !== null) view.tell();
 }
 
@@ -233,8 +233,8 @@ function zoom(low, high) {
   const least = 3;
   if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
   [range.low, range.high] = [low, high];
-  for (const each of along) each.show(low, high);
-  for (const told of range.onChange) told(low, high);
+  for (const view of along) view.show(low, high);
+  for (const listener of range.onChange) listener(low, high);
 }
 
 function startCharts(onFrame) {
@@ -242,11 +242,11 @@ function startCharts(onFrame) {
     const view = new ChartView(element, onFrame);
     if (!view.values.frames) continue;
     along.push(view);
-    range.whole ??= view.values.x;
+    range.drive ??= view.values.x;
   }
   if (!along.length) return;
   const fit = () => {
-    for (const each of along) each.show(each.low, each.high);
+    for (const view of along) view.show(view.low, view.high);
   };
   addEventListener("resize", fit);
   fit();

@@ -1,14 +1,14 @@
-// Two variants for the whole page: what belongs to others alone is hidden.
+// Two variants for the page: parts that belong to other variants are hidden.
 
 let chosen = [];
 
-/** Whether what has a name is seen: what is of no variant always is. */
+/** Whether a part of this name is shown: parts that belong to no variant always are. */
 function isShown(name) {
   const form = document.querySelector(".choice");
   if (!chosen.length || !form || !name) return true;
-  const known = [...form.querySelector("select").options].map((each) => each.value).filter(Boolean);
-  const own = known.find((each) => name === each || name.startsWith(`${each}: `));
-  return !own || chosen.includes(own);
+  const variants = [...form.querySelector("select").options].map((option) => option.value).filter(Boolean);
+  const variant = variants.find((start) => name === start || name.startsWith(`${start}: `));
+  return !variant || chosen.includes(variant);
 }
 
 function startChoice(onChange) {
@@ -20,7 +20,7 @@ function startChoice(onChange) {
     other.disabled = !one.value;
     if (!one.value) other.value = "";
     chosen = [one.value, other.value].filter(Boolean);
-    for (const each of document.querySelectorAll("[data-of]")) each.toggleAttribute("hidden", !isShown(each.dataset.of));
+    for (const part of document.querySelectorAll("[data-of]")) part.toggleAttribute("hidden", !isShown(part.dataset.of));
     onChange();
   });
 }

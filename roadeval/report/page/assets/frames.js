@@ -1,4 +1,4 @@
-// The browser of frames: one is looked at, the table tells of all and is filtered.
+// The browser of frames: pictures of one frame, and a table of all that can be filtered.
 
 class Browser {
   constructor(element) {
@@ -7,7 +7,7 @@ class Browser {
     this.absent = element.querySelector(".absent");
     this.rows = [...element.querySelectorAll(".frames tbody tr")];
     this.byFrame = new Map(this.rows.map((row) => [Number(row.dataset.frame), row]));
-    this.held = new Map([...this.strips.children].map((each) => [Number(each.dataset.frame), each]));
+    this.held = new Map([...this.strips.children].map((strip) => [Number(strip.dataset.frame), strip]));
     this.stage = new Stage(element.querySelector(".stage"), element.dataset.left, element.dataset.right);
     this.tools();
     this.filters();
@@ -25,7 +25,7 @@ class Browser {
       this.stage.toggle();
     });
     range.onChange.push(() => this.filter());
-    for (const each of this.held.values()) each.hidden = true;
+    for (const strip of this.held.values()) strip.hidden = true;
     this.follow(Boolean(location.hash));
     addEventListener("popstate", () => this.follow(true));
   }
@@ -55,7 +55,7 @@ class Browser {
     });
   }
 
-  /** Frames that can be looked at, in the drive's order: all, or of the filtered ones, if any is. */
+  /** Frames with pictures, in the drive's order; of the filtered frames, if any of them has some. */
   pictured() {
     const all = this.rows.filter((row) => row.classList.contains("pictured"));
     const shown = all.filter((row) => !row.hidden);
@@ -64,26 +64,26 @@ class Browser {
 
   step(by) {
     const frames = this.pictured();
-    const next = by > 0 ? frames.find((each) => each > this.frame) : frames.findLast((each) => each < this.frame);
+    const next = by > 0 ? frames.find((number) => number > this.frame) : frames.findLast((number) => number < this.frame);
     if (next !== undefined) this.show(next, { follow: true, address: "replaceState" });
   }
 
-  /** Show a frame; the address names it, as a step to go back from or in the place of the last. */
+  /** Show a frame; the address names it, as a new step of the history or in place of the last step. */
   show(frame, { scroll = false, follow = false, address = "pushState" } = {}) {
     this.frame = frame;
     if (address && location.hash !== `#frame-${frame}`) history[address](null, "", `#frame-${frame}`);
     this.element.querySelector(".viewer").hidden = false;
     const row = this.byFrame.get(frame);
-    for (const each of this.rows) each.removeAttribute("aria-current");
+    for (const other of this.rows) other.removeAttribute("aria-current");
     row?.setAttribute("aria-current", "true");
     if (follow && row) reveal(row);
-    for (const each of along) each.mark(frame);
-    for (const each of this.held.values()) each.hidden = Number(each.dataset.frame) !== frame;
+    for (const view of along) view.mark(frame);
+    for (const strip of this.held.values()) strip.hidden = Number(strip.dataset.frame) !== frame;
     this.position();
-    const strip = this.held.get(frame);
-    this.stage.offer(strip ? [...strip.querySelectorAll(".tile")] : []);
-    this.absent.hidden = Boolean(strip);
-    if (!strip) this.tellAbsent(frame);
+    const shown = this.held.get(frame);
+    this.stage.offer(shown ? [...shown.querySelectorAll(".tile")] : []);
+    this.absent.hidden = Boolean(shown);
+    if (!shown) this.tellAbsent(frame);
     if (scroll) this.element.querySelector(".viewer").scrollIntoView({ block: "start" });
   }
 
@@ -91,8 +91,8 @@ class Browser {
     const frames = this.pictured();
     const place = frames.indexOf(this.frame);
     this.where.textContent = `Frame ${this.frame}` + (place < 0 ? "" : ` \u00b7 ${place + 1} of ${frames.length}`);
-    this.previous.disabled = !frames.some((each) => each < this.frame);
-    this.next.disabled = !frames.some((each) => each > this.frame);
+    this.previous.disabled = !frames.some((number) => number < this.frame);
+    this.next.disabled = !frames.some((number) => number > this.frame);
   }
 
   tellAbsent(frame) {
@@ -112,48 +112,48 @@ class Browser {
   filters() {
     const form = this.element.querySelector(".filters");
     this.form = form;
-    this.told = form.querySelector("output");
+    this.count = form.querySelector("output");
     this.columns = [...this.element.querySelectorAll(".frames thead tr:last-child th")];
     form.hidden = false;
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("input", () => this.filter());
     form.addEventListener("reset", () => {
       setTimeout(() => {
-        if (range.whole) zoom(...range.whole);
+        if (range.drive) zoom(...range.drive);
         else this.filter();
       });
     });
   }
 
   filter() {
-    const wanted = Object.fromEntries(new FormData(this.form));
-    const [least, most] = [wanted.least, wanted.most].map((text) => (text ? Number(text) : NaN));
+    const limits = Object.fromEntries(new FormData(this.form));
+    const [least, most] = [limits.least, limits.most].map((text) => (text ? Number(text) : NaN));
     const places = this.columns.flatMap((title, place) => {
       const { variant, rate } = title.dataset;
-      return rate === wanted.rate && isShown(variant) ? [place] : [];
+      return rate === limits.rate && isShown(variant) ? [place] : [];
     });
     const fits = (value) => !(value < least) && !(value > most) && !(Number.isNaN(value) && (least >= 0 || most >= 0));
     for (const row of this.rows) {
       const frame = Number(row.dataset.frame);
       const inRate = !places.length || places.some((place) => fits(numberOf(row.cells[place].textContent)));
-      const inRange = !range.whole || (frame >= range.low && frame <= range.high) || range.low === range.high;
-      row.hidden = !(inRate && inRange && hasCondition(row, wanted.condition));
+      const inRange = !range.drive || (frame >= range.low && frame <= range.high) || range.low === range.high;
+      row.hidden = !(inRate && inRange && hasCondition(row, limits.condition));
     }
     this.hideColumns();
     const shown = this.rows.filter((row) => !row.hidden).length;
-    this.told.textContent = shown === this.rows.length ? "" : `${shown} of ${this.rows.length} frames`;
+    this.count.textContent = shown === this.rows.length ? "" : `${shown} of ${this.rows.length} frames`;
     if (this.frame !== undefined) this.position();
   }
 
-  /** Only the chosen variants' columns are there. */
+  /** Show only the chosen variants' columns. */
   hideColumns() {
     for (const [place, title] of this.columns.entries()) {
       title.hidden = !isShown(title.dataset.variant);
       for (const row of this.rows) row.cells[place].hidden = title.hidden;
     }
     const shown = this.columns.filter((title) => title.dataset.variant && !title.hidden);
-    const each = new Set(shown.map((title) => title.dataset.variant)).size;
-    for (const group of this.element.querySelectorAll(".frames .groups th")) group.colSpan = each;
+    const columns = new Set(shown.map((title) => title.dataset.variant)).size;
+    for (const group of this.element.querySelectorAll(".frames .groups th")) group.colSpan = columns;
   }
 }
 

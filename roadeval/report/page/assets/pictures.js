@@ -35,7 +35,7 @@ function enlargePicture(image) {
   enlarge([large, words]);
 }
 
-/** Two pictures of a frame over each other: left of the slider one, right of it the other. */
+/** Two pictures of a frame over each other: one to the left of the slider, one to the right. */
 class Stage {
   constructor(element, left, right) {
     this.element = element;
@@ -46,11 +46,11 @@ class Stage {
     this.edge = element.querySelector(".edge");
     this.slider = element.querySelector("input");
     this.selects = [element.querySelector(".left"), element.querySelector(".right")];
-    this.wanted = [left, right];
+    this.chosen = [left, right];
     this.slider.addEventListener("input", () => this.slide());
     for (const [side, select] of this.selects.entries()) {
       select.addEventListener("change", () => {
-        this.wanted[side] = select.value;
+        this.chosen[side] = select.value;
         this.draw();
       });
     }
@@ -75,12 +75,12 @@ class Stage {
     });
   }
 
-  /** Offer the pictures of a frame; those that were looked at before stay, where it has them. */
+  /** Offer the pictures of a frame; the choice of pictures stays, if the frame has them. */
   offer(tiles) {
     this.tiles = new Map(tiles.map((tile) => [tile.dataset.name, tile]));
     for (const [side, select] of this.selects.entries()) {
       select.replaceChildren(...[...this.tiles.keys()].map((name) => new Option(name, name)));
-      const name = this.tiles.has(this.wanted[side]) ? this.wanted[side] : [...this.tiles.keys()][0];
+      const name = this.tiles.has(this.chosen[side]) ? this.chosen[side] : [...this.tiles.keys()][0];
       select.value = name;
     }
     this.element.hidden = !tiles.length;
@@ -91,15 +91,15 @@ class Stage {
   prefer(variants) {
     const names = [...this.tiles.keys()];
     for (const [side, variant] of variants.entries()) {
-      const own = names.filter((each) => each.startsWith(`${variant}: `));
-      this.wanted[side] = own.find((each) => each.endsWith(": errors")) ?? own.at(-1) ?? this.wanted[side];
+      const pictures = names.filter((name) => name.startsWith(`${variant}: `));
+      this.chosen[side] = pictures.find((name) => name.endsWith(": errors")) ?? pictures.at(-1) ?? this.chosen[side];
     }
     this.offer([...this.tiles.values()]);
   }
 
   /** Look at one picture alone. */
   choose(name) {
-    this.wanted[0] = name;
+    this.chosen[0] = name;
     this.selects[0].value = name;
     this.slide(100);
     this.draw();
@@ -119,11 +119,11 @@ class Stage {
   }
 
   slide(share = Number(this.slider.value)) {
-    const kept = Math.min(100, Math.max(0, share));
-    this.slider.value = kept;
-    this.above.style.clipPath = `inset(0 ${100 - kept}% 0 0)`;
-    this.edge.style.left = `${kept}%`;
-    this.edge.hidden = kept <= 0 || kept >= 100;
+    const percent = Math.min(100, Math.max(0, share));
+    this.slider.value = percent;
+    this.above.style.clipPath = `inset(0 ${100 - percent}% 0 0)`;
+    this.edge.style.left = `${percent}%`;
+    this.edge.hidden = percent <= 0 || percent >= 100;
   }
 
   toggle() {

@@ -8,14 +8,14 @@ function makeTip(element) {
   return tip;
 }
 
-/** Put a tip beside a point of its element, where it has room. */
+/** Put a tip beside a point of its element, on the side that has room. */
 function place(tip, element, x, y) {
   const left = x + (x > element.clientWidth * 0.6 ? -tip.offsetWidth - 12 : 12);
   tip.style.left = `${Math.max(0, Math.min(left, element.clientWidth - tip.offsetWidth))}px`;
   tip.style.top = `${y}px`;
 }
 
-/** Rows of marks: one at a time is told. */
+/** Rows of marks: the numbers of one row are shown. */
 class RowsView {
   constructor(element) {
     this.element = element;
@@ -25,9 +25,8 @@ class RowsView {
     for (const [number, row] of this.rows.entries()) {
       // The browser's own words would stand beside ours.
       row.marks = [...row.querySelectorAll("circle")].map((mark) => {
-        const told = mark.dataset.told;
         mark.querySelector("title").remove();
-        return [told, mark.getAttribute("fill")];
+        return [mark.dataset.text, mark.getAttribute("fill")];
       });
       row.addEventListener("pointermove", () => this.point(number));
     }
@@ -53,8 +52,8 @@ class RowsView {
     if (number === null) return;
     const row = this.rows[number];
     row.classList.add("pointed");
-    const lines = row.marks.filter(([told]) => isShown(told)).map(([told, colour]) => {
-      const [, name, value] = /^(.*?): ([^:]*)$/s.exec(told) ?? [null, told, ""];
+    const lines = row.marks.filter(([text]) => isShown(text)).map(([text, colour]) => {
+      const [, name, value] = /^(.*?): ([^:]*)$/s.exec(text) ?? [null, text, ""];
       return tipLine(name, value, colour);
     });
     this.tip.replaceChildren(tipHead(row.querySelector(".name").textContent), ...lines);

@@ -1,6 +1,6 @@
-// Everything is there without a script; this makes it answer.
+// The page is complete without a script; this makes it interactive.
 
-/** Give each command a button that copies it, where the browser lets a page do that. */
+/** Give each command a button that copies it, if the browser allows it. */
 function makeCommands() {
   if (!navigator.clipboard) return;
   for (const command of document.querySelectorAll(".command")) {
@@ -16,7 +16,7 @@ function makeCommands() {
   }
 }
 
-/** Have the contents open beside the page, and closed where they would be above all else. */
+/** Open the contents beside the page, and close them if they are above it. */
 function fitOutline() {
   const wide = matchMedia("(min-width: 1100px)");
   const fit = () => (document.querySelector(".outline details").open = wide.matches);
@@ -24,12 +24,12 @@ function fitOutline() {
   fit();
 }
 
-/** Mark in the contents the section that is read. */
+/** Mark the current section in the contents. */
 function followOutline() {
   const links = new Map([...document.querySelectorAll(".outline a")].map((a) => [a.hash.slice(1), a]));
   const titles = [...links.keys()].map((name) => document.getElementById(name)).filter(Boolean);
   const follow = () => {
-    const above = titles.filter((each) => each.getBoundingClientRect().top < innerHeight / 3);
+    const above = titles.filter((title) => title.getBoundingClientRect().top < innerHeight / 3);
     const current = above.at(-1) ?? titles[0];
     for (const [name, link] of links) {
       if (name === current?.id) link.setAttribute("aria-current", "true");
@@ -58,12 +58,12 @@ followOutline();
 
 /** The frame of the table that is nearest to a number. */
 function nearestFrame(frame) {
-  const known = [...browser.byFrame.keys()].sort((a, b) => a - b);
-  return known[nearest(known, frame)];
+  const frames = [...browser.byFrame.keys()].sort((a, b) => a - b);
+  return frames[nearest(frames, frame)];
 }
 
 for (const image of document.querySelectorAll(".grid img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }
-// What was closed had no width to fit a chart's numbers into.
+// A closed chart had no width to fit its numbers into.
 for (const more of document.querySelectorAll("details")) more.addEventListener("toggle", () => dispatchEvent(new Event("resize")));

@@ -1,20 +1,20 @@
-// Tables that sort by a click on a column's title, and fields that look for words in long ones.
+// Tables that sort by a click on a column's title, and fields that search long tables.
 
 const MOST_ROWS = 3; // Fewer rows need no sorting.
 
-/** The number that a cell's text begins with, as people write it; NaN if it is none. */
+/** The number at the beginning of a cell's text, as people write it; NaN without one. */
 function numberOf(text) {
   const plain = text.trim().replaceAll(",", "").replaceAll("\u2212", "-");
   return /^[-+]?[\d.]/.test(plain) ? parseFloat(plain) : NaN;
 }
 
-function compared(a, b) {
+function compare(a, b) {
   const [x, y] = [numberOf(a), numberOf(b)];
   if (!Number.isNaN(x) && !Number.isNaN(y)) return x - y;
   return a.localeCompare(b, undefined, { numeric: true });
 }
 
-/** Whether a cell says that there is nothing to say; such rows are last in both directions. */
+/** Whether a cell is empty; such rows are last in both directions. */
 const isEmpty = (text) => ["", "\u2013", "none given"].includes(text.trim());
 
 function sort(table, column, descending) {
@@ -23,9 +23,9 @@ function sort(table, column, descending) {
   const rows = [...body.rows];
   const totals = rows.filter((row) => row.classList.contains("total"));
   const others = rows.filter((row) => !row.classList.contains("total"));
-  const known = others.filter((row) => !isEmpty(text(row)));
-  known.sort((a, b) => (descending ? -1 : 1) * compared(text(a), text(b)));
-  body.append(...known, ...others.filter((row) => isEmpty(text(row))), ...totals);
+  const filled = others.filter((row) => !isEmpty(text(row)));
+  filled.sort((a, b) => (descending ? -1 : 1) * compare(text(a), text(b)));
+  body.append(...filled, ...others.filter((row) => isEmpty(text(row))), ...totals);
   for (const row of body.querySelectorAll(".rule:not(.total)")) row.classList.remove("rule");
   table.classList.add("sorted");
 }
@@ -44,7 +44,7 @@ function makeSortable(table) {
       const first = title.classList.contains("t") || column === 0 ? "ascending" : "descending";
       const other = first === "ascending" ? "descending" : "ascending";
       const order = title.getAttribute("aria-sort") === first ? other : first;
-      for (const each of titles) each.removeAttribute("aria-sort");
+      for (const other of titles) other.removeAttribute("aria-sort");
       title.setAttribute("aria-sort", order);
       sort(table, column, order === "descending");
     });
@@ -52,16 +52,16 @@ function makeSortable(table) {
 }
 
 function makeSearchable(long) {
-  const [field, told] = [long.querySelector("input"), long.querySelector("output")];
+  const [field, count] = [long.querySelector("input"), long.querySelector("output")];
   const rows = [...long.querySelector("tbody").rows];
   long.querySelector(".find").hidden = false;
   field.addEventListener("input", () => {
-    const wanted = field.value.trim().toLowerCase().split(/\s+/);
+    const words = field.value.trim().toLowerCase().split(/\s+/);
     for (const row of rows) {
       const text = row.textContent.toLowerCase();
-      row.hidden = !wanted.every((word) => text.includes(word));
+      row.hidden = !words.every((word) => text.includes(word));
     }
     const shown = rows.filter((row) => !row.hidden).length;
-    told.textContent = shown === rows.length ? "" : `${shown} of ${rows.length}`;
+    count.textContent = shown === rows.length ? "" : `${shown} of ${rows.length}`;
   });
 }
