@@ -179,7 +179,7 @@ def notes(
         change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
         if abs(change) >= NOTEWORTHY:
             verb = "raised" if change > 0 else "lowered"
-            yield f"{_OF_FILTER}{verb} ERR by {percent(abs(change), 1)} pp on this frame."
+            yield f"{_OF_FILTER}{verb} ERR by {percent(abs(change), 1)} points on this frame."
     for name, rates in finals.items():
         if rates["FNR"] >= FAILED_FNR:
             yield f"{name} finds {percent(1 - rates['FNR'], 1)} % of the road."
@@ -188,7 +188,7 @@ def notes(
     for name, rates in finals.items():
         if blind is not None and (excess := rates["ERR"] - blind["ERR"]) >= NOTEWORTHY:
             yield (
-                f"{name} is {percent(excess, 1)} pp worse than {BASELINE} "
+                f"{name} is {percent(excess, 1)} points worse than {BASELINE} "
                 f"(ERR {percent(blind['ERR'], 1)} %)."
             )
 

@@ -98,6 +98,16 @@ def _how_wrong(name: str, rates: Rates) -> str:
     of = counted(rates["frames"], "frame")
     if rates.get("drives", 1) > 1:
         of = counted(rates["drives"], "drive")
+    how = f" It {kinds}." if (kinds := describe_errors(rates)) else ""
+    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({of}).{how}"
+
+
+def describe_errors(rates: Rates) -> str:
+    """Return how much road is missed and how much else is called road; empty if both are undefined.
+
+    >>> describe_errors({"FNR": 0.32, "FPR": 0.0004})
+    'misses 32.0 % of the road and calls almost nothing else road'
+    """
     kinds = []
     if defined(missed := rates["FNR"]):
         share = f"{percent(missed, 1)} %" if missed >= ROUNDING else "almost nothing"
@@ -105,8 +115,7 @@ def _how_wrong(name: str, rates: Rates) -> str:
     if defined(added := rates["FPR"]):
         share = f"{percent(added, 1)} % of the rest" if added >= ROUNDING else "almost nothing else"
         kinds.append(f"calls {share} road")
-    how = f" It {' and '.join(kinds)}." if kinds else ""
-    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({of}).{how}"
+    return " and ".join(kinds)
 
 
 def _best_variant(best: str, focus: str, rates: Mapping[str, Rates]) -> Iterator[str]:

@@ -130,7 +130,9 @@ def test_figures_and_reports_show_the_drive_escaped(told, folder):
 
 def test_markdown_shows_the_names_and_no_markup(told, folder):
     label = f"recordings/{visible(DRIVE)}.rrd"
-    assert as_markdown(f" than {label}") in (folder / "two.md").read_text(encoding="utf-8")
+    assert as_markdown(f" exactly as good as {label} ") in (folder / "two.md").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_the_viewers_texts_show_them_too(told, folder):

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from roadeval.cli.screens.tables import ascii_of, show_table
-from roadeval.data.words import percent, points, short_names
+from roadeval.cli.screens.tables import show_table
+from roadeval.data import FILTERED
+from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Table
 from roadeval.results.sentences import without_filter
+from roadeval.results.verdict import describe_errors
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -57,10 +59,11 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
 
 
 def _why(frame: WorstFrame) -> str:
-    (first, value), *rest = frame.parts.items()
-    terms = [f"{first} {percent(value, 1)}", *(f"{name} {points(part, 1)}" for name, part in rest)]
-    sentences = [f"{ascii_of(', '.join(terms))} pp."]
-    for note in without_filter(frame.notes) if rest else frame.notes:
-        shown = note.removeprefix(f"{frame.variant} ")  # the title names the variant
-        sentences.append(shown[:1].upper() + shown[1:])
-    return " ".join(sentences)
+    """Return which errors a frame has, and the notes on it; on the filter only of what has it."""
+    notes = frame.notes if frame.variant == FILTERED else without_filter(frame.notes)
+    # The title names the variant.
+    clauses = [
+        f"{describe_errors(frame.rates)}.",
+        *(n.removeprefix(f"{frame.variant} ") for n in notes),
+    ]
+    return " ".join(clause[:1].upper() + clause[1:] for clause in clauses)

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 
 def show(outcome: Outcome, out: Console) -> None:
-    """Print what a replay read, how well each variant did, and where everything was written."""
+    """Print what a replay read, each variant's rates, the outputs' places, and last the verdict."""
     facts = outcome.facts
     cameras = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
     out.print(f"{facts.drive.name}: {cameras}{account(facts.frames, facts.windows)}")
     out.print()
     if facts.totals:
-        tables.show([Text(with_flags(facts.verdict)), *_score_tables(facts, outcome.metres)], out)
+        tables.show([*_score_tables(facts, outcome.metres)], out)
     else:
         for sentence in facts.misfits:
             out.print(with_flags(sentence))
@@ -45,6 +45,9 @@ def show(outcome: Outcome, out: Console) -> None:
             out.print(sentence)
     out.print()
     _show_files(outcome, out)
+    if facts.totals:
+        out.print()
+        tables.show([Text(with_flags(facts.verdict))], out)
 
 
 def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block]:

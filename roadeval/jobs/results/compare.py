@@ -17,7 +17,7 @@ from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.report.chart import Chart, Look, looks, looks_of_results
+from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.pdf.typeset import typeset, write_file
 from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
@@ -256,11 +256,6 @@ def _frames(side: Side) -> pd.DataFrame:
     return side.table("frames", [side.drives[0].key])
 
 
-def _looks_of_masks(masks: Sequence[ComparedMask]) -> dict[str, Look]:
-    """Return how masks are drawn: a hue a variant, a dash a result."""
-    return looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
-
-
 def over_drive(compared: Compared) -> list[Chart]:
     """Return ERR over the one drive that is compared, and the baseline's; none of several."""
     if (common := compared_masks(compared.sides)) is None:
@@ -271,4 +266,6 @@ def over_drive(compared: Compared) -> list[Chart]:
     size = compared.comparison.settings.window
     size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
     rows = rows.assign(drive="", camera="")  # the results may call them differently
-    return over_windows(windows(rows, size), [TESTED], _looks_of_masks(masks) | looks([BASELINE]))
+    # A hue a variant, a dash a result.
+    of_masks = looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
+    return over_windows(windows(rows, size), [TESTED], of_masks | looks([BASELINE]))

@@ -173,17 +173,14 @@ def misfits_of_truth(log: Log) -> Iterator[str]:
     numbers = selection.among_truth(log.frames(selection).numbers)
     places = np.linspace(0, len(numbers) - 1, FEW, dtype=int).tolist()
     every = log.config.frames.every
-    near = {number for place in places for number in _around(numbers[place], every)}
+    lags = [lag * every for lag in range(-LAST_LAG, LAST_LAG + 1)]
+    near = {numbers[place] + lag for place in places for lag in lags}
     fit = FitCheck(numbers, every, FEW)
     for logged in log.frames(selection, near):
         with suppress(FrameError):
             fit.add(logged.decode())
     for finding in fit.findings():
         yield misfit_sentence(finding, selection, log.config)
-
-
-def _around(number: int, stride: int) -> range:
-    return range(number - LAST_LAG * stride, number + LAST_LAG * stride + 1, stride)
 
 
 def misfit_sentence(finding: Finding, selection: Selection, config: LogConfig) -> str:
