@@ -54,20 +54,11 @@ def verdict(
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
     They say how wrong it is and how; which variant is best, if it is another; how it compares with
-    the baseline and with the filter's absence; and what to do next.
-
-    Parameters
-    ----------
-    totals
-        Rates by variant and stage; empty if nothing was scored.
-    effects
-        Differences, those of final masks at least.
-    thresholds
-        What other thresholds would bring, as in `roadeval.results.facts.Facts`.
-    unlabelled
-        The frames to look at if nothing was scored.
-    estimated
-        The rates of the whole drive, from frames that were drawn at random.
+    the baseline and with the filter's absence; and what to do next. ``totals`` are rates by variant
+    and stage, empty if nothing was scored; ``effects`` are of final masks at least; ``thresholds``
+    are the best ones, as in `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled``
+    tells which frames to look at. ``estimated`` are rates of the whole drive, from frames that were
+    drawn at random.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])

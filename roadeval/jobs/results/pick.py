@@ -293,10 +293,8 @@ def _add_picks(
 
     A frame that was ranked before, and is drawn now, becomes a random one.
     """
-    drawn, wave = (
-        picks.drawn + len(random),
-        max((earlier.wave for earlier in picks.picked), default=0) + 1,
-    )
+    drawn = picks.drawn + len(random)
+    wave = max((earlier.wave for earlier in picks.picked), default=0) + 1
     probability, stamps = drawn / len(picks.stamps), {picks.stamps[place] for place in random}
     old = [
         replace(earlier, why=Why.RANDOM, probability=probability)

@@ -357,15 +357,7 @@ class Result:
     @cached_property
     def compared(self) -> tuple[ComparedDrive, ...]:
         """The drives, as a comparison knows them."""
-        return tuple(
-            drive
-            for result in self._opened
-            for drive in (
-                _compared_drives(result)
-                if isinstance(result, FleetFolder)
-                else [_compared_drive(result)]
-            )
-        )
+        return tuple(chain.from_iterable(map(_compared_drives, self._opened)))
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -415,14 +407,14 @@ class Result:
         return concatenate(parts)
 
 
-def _compared_drive(result: DriveResult) -> ComparedDrive:
-    facts, frames = result.facts, result.rows["frame"].nunique()
-    settings = number_settings(facts.run) | input_digests(facts)
-    return ComparedDrive(*result.key, result.title, facts.log_digest, frames, settings)
-
-
-def _compared_drives(fleet: FleetFolder) -> Iterator[ComparedDrive]:
-    settings, drives = number_settings(fleet.facts.run), records(fleet.drives)
+def _compared_drives(result: Opened) -> Iterator[ComparedDrive]:
+    settings = number_settings(result.facts.run)
+    if isinstance(result, DriveResult):
+        facts, frames = result.facts, result.rows["frame"].nunique()
+        settings |= input_digests(facts)
+        yield ComparedDrive(*result.key, result.title, facts.log_digest, frames, settings)
+        return
+    fleet, drives = result, records(result.drives)
     scored = next((row["drive"] for row in drives if row["evaluated"]), None)
     if scored is not None:
         with suppress(RoadevalError):  # the folders of its drives may be gone
