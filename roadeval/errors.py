@@ -33,7 +33,7 @@ class RoadevalError(Exception):
         self.setting = setting
         """The setting that is wrong, as ``topics.truth``; empty where it is none."""
         self.remedy = remedy
-        """What to do next."""
+        """The next step that helps."""
         self.in_file = False
         """Whether settings stand in a file, where flags do not name them."""
 

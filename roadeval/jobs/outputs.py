@@ -75,7 +75,7 @@ def holding(
     """
     paths = [Path(file) for file in files if file is not None]
     outputs = [*paths, *([folder] if folder else [])]
-    # Of a loop of links pathlib makes an error of its own.
+    # For a loop of links pathlib raises an error of its own.
     places = [os.path.realpath(path) for path in outputs]
     taken = {os.path.realpath(place) for path in inputs if path for place in _places(Path(path))}
     for number, path in enumerate(outputs):

@@ -91,8 +91,8 @@ def compare(
     across = len(paths) == 1
     opened = [Result(path) for path in paths]
     if across:
-        whole = Side(opened[0].name, opened[0].compared, opened[0].table)
-        sides = variants_as_sides(whole, opened[0].variants, variants)
+        opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
+        sides = variants_as_sides(opened_side, opened[0].variants, variants)
         opened *= len(sides)
     else:
         sides = _choose_sides(opened, _name_results(paths), variants)
@@ -105,7 +105,7 @@ def compare(
     partial = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
     lost = dict.fromkeys(filter(None, map(_failure_sentence, opened)))
     comparison = replace(comparison, warnings=(*lost, *partial, *comparison.warnings))
-    alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
+    alone = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: result.drive
         for side, result in labelled

@@ -40,7 +40,7 @@ LAYERS: Final = 2
 PICTURED: Final = 24
 """Frames of a page with pictures, at most."""
 BYTES: Final = 9_900_000
-"""Of a page, at most."""
+"""Size of a page, at most."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:

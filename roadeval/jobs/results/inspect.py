@@ -38,19 +38,19 @@ class WorstFrame:
     variant: str
     stage: str
     rates: Mapping[str, float | None]
-    """Of a frame without truth its doubt, see `roadeval.results.schema.TABLES`."""
+    """Rates, or the doubt on a frame without truth, see `roadeval.results.schema.TABLES`."""
     by: str = TESTED
-    """By which of these it is ranked."""
+    """The rate, or the doubt, that ranks it."""
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of ERR by stage, see `roadeval.evaluation.tables.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()
-    """What the recording says about it."""
+    """The recording's notes on it."""
     picture: str | None = None
     """In a fleet: the file of its errors."""
     recording: Path | None = None
     """The drive's recording, where there is one."""
     camera: str = ""
-    """Of a rig: which camera's frame it is."""
+    """The camera whose frame it is, in a rig."""
 
 
 def worst_frames(

@@ -53,7 +53,7 @@ class PickedFrames:
 
     @property
     def added(self) -> list[Picked]:
-        """Those frames."""
+        """The frames that this command has added."""
         return self.picks.picked[len(self.picks.picked) - self.new :]
 
 

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from roadeval.recording.recording import Recording
 
 OF_ALL: Final = ("code of ", "network ")
-"""What `input_digests` calls files that all drives of a fleet share."""
+"""Beginnings of the names that `input_digests` gives to files of all drives of a fleet."""
 NO_NUMBER: Final = ("output", "run", "fleet")
 """Tables of a run's settings that change no number."""
 

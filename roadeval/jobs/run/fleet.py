@@ -133,7 +133,7 @@ class FleetRun:
     """Who does the tasks; None until there is one, and Dask's workers are started then."""
     workers: int = 1
     done: dict[str, Done] = field(default_factory=dict)
-    """What is known of each drive that is done, by its ID."""
+    """Reports of the drives that are done, by their IDs."""
     stack: ExitStack = field(default_factory=ExitStack)
     """Ends the processes that were started for the run."""
 

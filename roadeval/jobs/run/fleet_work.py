@@ -70,13 +70,13 @@ class DriveTask:
     """The fleet's: the same path for every worker."""
     entry: DriveEntry
     config: RunConfig
-    """Of this drive, its model included."""
+    """Configuration of this drive, its model included."""
     software: Mapping[str, str]
-    """That of the program that asks, see `roadeval.jobs.run.prepared.software`."""
+    """Software of the program that asks, see `roadeval.jobs.run.prepared.software`."""
     model: str = ""
     """SHA-256 of the model file; empty where the drive trains its own."""
     fold: int | None = None
-    """Whose model that is; None without folds."""
+    """The fold whose model it is; None without folds."""
 
     @property
     def asked(self) -> str:
@@ -85,7 +85,7 @@ class DriveTask:
 
     @property
     def record(self) -> str:
-        """Whose pictures are recorded; a drive without its recording is not done."""
+        """The rule for pictures to record; a drive without its recording is not done."""
         return self.config.output.record if self.config.fleet.keep == "all" else "none"
 
 
@@ -276,12 +276,12 @@ class FoldTask:
 
     folder: Path
     fold: int
-    """Whose drives the model will score."""
+    """The fold whose drives the model will score."""
     candidates: tuple[tuple[DriveEntry, RunConfig], ...]
     """Drives of the other folds, with their configurations, in the order of being asked."""
     config: RunConfig
     software: Mapping[str, str]
-    """That of the program that asks."""
+    """Software of the program that asks."""
 
     @property
     def path(self) -> Path:
@@ -294,9 +294,9 @@ class FoldModel:
     """The model of a fold."""
 
     fold: int
-    """Whose drives it will score."""
+    """The fold whose drives it will score."""
     sha256: str
-    """Of its file; empty where there is none."""
+    """SHA-256 of its file; empty if there is none."""
     problem: str = ""
 
 

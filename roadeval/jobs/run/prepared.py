@@ -77,7 +77,7 @@ class Failures:
 
     by_error: dict[tuple[str, str], list[Failure]] = field(default_factory=dict)
     first: list[Failure] | None = field(default_factory=list)
-    """Those of `TRIED` roles; None once a frame of these did not fail."""
+    """The failures of `TRIED` roles; None once a frame of these did not fail."""
 
     def __len__(self) -> int:
         return sum(map(len, self.by_error.values()))
@@ -122,19 +122,18 @@ class Run:
     variants: tuple[Variant, ...]
     model: Model
     schedule: Schedule
-    """What they learnt, and which frames are not evaluated because of it."""
+    """The frames that are not evaluated because the model learnt from them or from neighbours."""
     chains: Mapping[str, Chain]
     layouts: tuple[VariantLayout, ...]
     """Every variant that is scored, those included whose masks the log carries."""
     methods: Mapping[str, Mapping[str, Any]]
-    """What stages tell of themselves beside their settings, by variant and stage. It is read before
-    the first frame: a file that they name may be gone after the last.
-    """
+    """Facts of stages beside their settings, by variant and stage. They are read before the first
+    frame: a file that they name may be gone after the last."""
     board: Scoreboard
     fit: FitCheck
     """Whether truth and masks fit the images, as far as frames were added."""
     camera: str = ""
-    """What the camera is called in a rig; elsewhere its topic is its name."""
+    """The camera's name in a rig; elsewhere its topic is its name."""
     failures: Failures = field(default_factory=Failures)
     """The frames on which a stage failed, so far."""
 

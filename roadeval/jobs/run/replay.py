@@ -148,12 +148,12 @@ def _replay_log(
 
 @dataclass(frozen=True, eq=False)
 class _CameraResult:
-    """What a camera's run has found."""
+    """The results of a camera's run."""
 
     facts: Facts
     sums: DriveSums
     texts: Mapping[str, str]
-    """Of its results, as the recording keeps them."""
+    """Texts of its results, as the recording keeps them."""
     metres: tuple[Mapping[str, Any], ...]
 
 
