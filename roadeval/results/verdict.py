@@ -74,7 +74,7 @@ def verdict(
     return " ".join(
         [
             *whole_drive,
-            f"{lead}{_how_wrong(focus, rates[focus])}",
+            f"{lead}{_how_wrong(focus, rates[focus], [*of_focus.values()])}",
             *_best_variant(best, focus, rates),
             *_compared(focus, of_focus),
             *_next_step(focus, rates, thresholds or {}),
@@ -82,13 +82,17 @@ def verdict(
     )
 
 
-def _how_wrong(name: str, rates: Rates) -> str:
+def _how_wrong(name: str, rates: Rates, differences: Sequence[Difference]) -> str:
     """Return how many pixels a final mask has wrong, and which ones."""
     if not defined(rates[TESTED]):
         return f"{name}: {TESTED} is undefined on every frame."
     of = counted(rates["frames"], "frame")
     if rates.get("drives", 1) > 1:
         of = counted(rates["drives"], "drive")
+        if groups := {change.groups or rates["drives"] for change in differences} - {
+            rates["drives"]
+        }:
+            of += f" in {counted(min(groups), 'group')}"
     how = f" It {kinds}." if (kinds := describe_errors(rates)) else ""
     return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({of}).{how}"
 

@@ -278,5 +278,5 @@ def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
         each["rates"]["ERR"] for each in outcome.summary["effects"] if each["base"] == "unfiltered"
     )
     assert (effect["units"], effect["groups"]) == (4, 1)
-    assert "in 1 group " in outcome.summary["verdict"]
+    assert "(4 drives in 1 group)" in outcome.summary["verdict"]
     assert re.search("copy0-.* is a copy of a-.*, and 2 more are", outcome.summary["warnings"][0])

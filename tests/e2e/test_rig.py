@@ -177,7 +177,7 @@ def test_a_camera_without_labels_is_recorded_and_says_why(rig: Path, tmp_path: P
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--truth-topic", "/front/truth/road"), "which camera's?"),
+        (("--truth-topic", "/front/truth/road"), "belongs to one of several cameras"),
         (("--truth", "labels"), "belong to one camera"),
         (topics("front"), "given twice"),
     ],
@@ -292,4 +292,4 @@ def test_of_a_rig_each_camera_has_its_own_ground(tmp_path: Path):
     (tmp_path / "camera.toml").write_text(CAMERA)
     refused = here("replay", "rig.mcap", *words, "--camera", "camera.toml", cwd=tmp_path)
     assert refused.returncode != 0
-    assert "which camera's?" in refused.stderr
+    assert "belongs to one of several cameras" in refused.stderr

@@ -18,6 +18,7 @@ ZERO = a_difference(0, 0, 0, p=1.0, units=91)
 SHORT = replace(UNSURE, low=None, high=None, p=None, units=3, needed=10)
 ONE_SCENE = replace(BETTER, effective=2.1)
 OF_DRIVES = replace(BETTER, unit="drives", units=8, groups=8)
+OF_MANY = replace(OF_DRIVES, units=500, groups=500)
 FEW_DRIVES = replace(SHORT, unit="drives", groups=3, needed=6)
 
 
@@ -136,7 +137,7 @@ CASES = {
     ),
     "a fleet of one": ((fleet(1, robust=0.02, blind=0.1), against("blind", robust=BETTER)), None),
     "a fleet of five hundred": (
-        (fleet(500, filtered=0.02, unfiltered=0.1, blind=0.1), filtered(OF_DRIVES, OF_DRIVES)),
+        (fleet(500, filtered=0.02, unfiltered=0.1, blind=0.1), filtered(OF_MANY, OF_MANY)),
         None,
     ),
     "a rig": ((drive(filtered=0.02, unfiltered=0.03, blind=0.1), filtered(BETTER, BETTER)), None),
