@@ -224,7 +224,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     if not rows:
         return
     focus = focus_of(findings.finals)
-    yield Heading(f"The worst frames of {focus} over all drives")
+    yield Heading("The worst frames over all drives")
     pictures = []
     for row in rows:
         title = f"{elide(findings.names[row['drive']], LONGEST)}, frame {row['frame']}"
