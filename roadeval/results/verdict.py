@@ -71,11 +71,12 @@ def verdict(
     of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
     whole_drive = [*from_labels(estimated, focus)]
     lead = "On these alone: " if whole_drive else ""
+    other = f"Best here is {best}: {percent(rates[best][TESTED], 1)} %."
     return " ".join(
         [
             *whole_drive,
             f"{lead}{_how_wrong(focus, rates[focus], [*of_focus.values()])}",
-            *_best_variant(best, focus, rates),
+            *([other] if rates[best][TESTED] != rates[focus][TESTED] else []),
             *_compared(focus, of_focus),
             *_next_step(focus, rates, thresholds or {}),
         ]
@@ -111,12 +112,6 @@ def describe_errors(rates: Rates) -> str:
         share = f"{percent(added, 1)} % of the rest" if added >= ROUNDING else "almost nothing else"
         kinds.append(f"calls {share} road")
     return " and ".join(kinds)
-
-
-def _best_variant(best: str, focus: str, rates: Mapping[str, Rates]) -> Iterator[str]:
-    """Yield which variant is best, if it is not the focus."""
-    if best != focus and rates[best][TESTED] != rates[focus][TESTED]:
-        yield f"Best here is {best}: {percent(rates[best][TESTED], 1)} %."
 
 
 def _compared(focus: str, differences: Mapping[str, Difference]) -> Iterator[str]:

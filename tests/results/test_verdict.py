@@ -6,7 +6,7 @@ import pytest
 
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.results.facts import UnlabelledFacts
-from roadeval.results.verdict import describe_change, focus_of, verdict
+from roadeval.results.verdict import describe_change, describe_errors, focus_of, verdict
 from tests.evaluation.making import a_difference
 
 WORDS = 60
@@ -174,6 +174,13 @@ def test_without_truth_it_says_where_to_look_first():
 )
 def test_the_focus_is_what_the_user_brought(variants, focus):
     assert focus_of(variants) == focus
+
+
+def test_a_share_that_would_read_as_nothing_is_said_in_words():
+    assert describe_errors({"FNR": 0.0004, "FPR": 0.0006}) == (
+        "misses almost nothing of the road and calls 0.1 % of the rest road"
+    )
+    assert describe_errors({"FNR": float("nan"), "FPR": float("nan")}) == ""
 
 
 # --- Two masks compared ---------------------------------------------------------------------------

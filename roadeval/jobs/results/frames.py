@@ -201,7 +201,8 @@ class FramePicker:
         The first of a row bears the variant's name, too.
         """
         image = recording.image(frame)
-        for variant in recording.variants[self._layered]:
+        focus_first = sorted(recording.variants, key=lambda variant: variant.name != self._focus)
+        for variant in focus_first[self._layered]:
             specs = [
                 spec
                 for spec in variant.layers

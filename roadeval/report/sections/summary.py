@@ -26,6 +26,7 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
+from roadeval.results.verdict import focus_of
 
 LOSSES: Final = 3
 """Most losses that are named."""
@@ -63,8 +64,8 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
         legend = caption("thumbnails without truth")
-        for first in [*findings.finals][:1]:
-            legend = caption("thumbnails", variant=first, errors=caption("errors"))
+        if focus := focus_of(findings.finals):
+            legend = caption("thumbnails", variant=focus, errors=caption("errors"))
         yield ImageGrid(pictures, 4, caption=legend)
     yield _beware([*warnings(findings)])
 
