@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import BASELINE, ERRORS, FILTERED, IGNORE, TRUTH, UNFILTERED, Health, LayerKind
+import numpy as np
+
+from roadeval.data import (
+    BASELINE,
+    ERRORS,
+    FILTERED,
+    IGNORE,
+    OUTCOMES,
+    TRUTH,
+    UNFILTERED,
+    Health,
+    LayerKind,
+)
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.frame import judge
+from roadeval.evaluation.score.thresholds import LEVELS
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.evaluation.tables import finals, only, scene_ns, values_of
@@ -19,14 +33,24 @@ from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import DriveResult
 from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip
-from roadeval.report.charts.standard import over_frames
+from roadeval.report.charts.standard import over_frames, ribbons
+from roadeval.report.film import (
+    CAMERA,
+    MASK,
+    PROBABILITY,
+    TRUTH_PANEL,
+    Film,
+    make_film,
+    shade_truth,
+)
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, fade
-from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
+from roadeval.report.sections.frames import SMALL, FrameBrowser, ThresholdSlider, strip
 from roadeval.results.sentences import notes
 from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     import pandas as pd
 
     from roadeval.recording.recording import Recording
@@ -34,13 +58,17 @@ if TYPE_CHECKING:
 WORST: Final = 4
 MOVED: Final = 2
 """Frames that a report shows: the worst, and those that the filter helped and harmed most."""
-OUTCOMES: Final = 6
+ERRORS_SHOWN: Final = 6
 LAYERS: Final = 2
 """Variants of which such a frame shows the errors, and all layers, on paper."""
-PICTURED: Final = 24
-"""Frames of a page with pictures, at most."""
+PICTURED: Final = 8
+"""Frames of a page with pictures of all layers, at most."""
 BYTES: Final = 9_900_000
 """Size of a page, at most."""
+FILMED: Final = 500
+"""Frames of a page's video, at most: a longer drive is thinned."""
+FILM_BYTES: Final = 30_000
+"""Bytes of a page's video, at most, for each frame; a third more as text of the page."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -75,7 +103,7 @@ class FramePicker:
     """
 
     def __init__(
-        self, result: DriveResult, outcomes: int | None = OUTCOMES, layered: int | None = LAYERS
+        self, result: DriveResult, outcomes: int | None = ERRORS_SHOWN, layered: int | None = LAYERS
     ) -> None:
         self._result = result
         self._outcomes, self._layered = slice(outcomes), slice(layered)
@@ -216,21 +244,58 @@ class FramePicker:
             yield row
 
 
-def browsed(result: DriveResult) -> FrameBrowser:
-    """Collect the frames of a result for a page, without their pictures."""
+def browsed(result: DriveResult, verdicts: Mapping[str, str]) -> FrameBrowser:
+    """Collect the frames of a result for a page, without their pictures.
+
+    ``verdicts`` are those on each variant, if it is the focus.
+    """
     frames, names = result.rows, [*SHORT]
     if not len(frames):
         frames = result.table("unlabelled")
         names = [sign for sign in SIGNS if frames[sign].notna().any()]
-    there = result.recording.variants if result.recording else ()
+    charts = over_frames(frames, names)
+    masks = finals(result.rows)
+    variants = values_of(frames, "variant")
     return FrameBrowser(
         rows=[*facts_of(result)],
-        variants=values_of(frames, "variant"),
+        variants=variants,
         titles=names,
-        charts=over_frames(frames, names),
+        charts=charts,
         command=result.inspect("{}") if result.recording else "",
-        masks=[f"{variant.name}: {variant.stages[-1]}" for variant in there],
+        ribbons=ribbons(charts[:1]),
+        counts={
+            name: dict(
+                zip(rows["frame"].tolist(), rows[[*OUTCOMES]].to_numpy().tolist(), strict=True)
+            )
+            for name in variants
+            if len(rows := only(masks, variant=name))
+        },
+        verdicts=verdicts,
+        worst={
+            name: tables.worst(only(masks, variant=name), PICTURED)["frame"].tolist()
+            for name in variants
+        },
+        thresholds=[*_thresholds_of(result)],
     )
+
+
+def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
+    """Yield the thresholds that can be moved: of stages that tell how probable road is."""
+    facts, levels = result.facts, result.table("probabilities")
+    for variant, stages in facts.curves.items():
+        for stage in stages:
+            rows = only(levels, variant=variant, stage=stage)
+            best, settings = facts.thresholds.get(variant, {}), facts.settings.get(variant, {})
+            now = settings.get(stage, {}).get("threshold", best.get("own"))
+            if now is None or not len(rows):
+                continue
+            by_level = np.zeros((2, LEVELS), np.int64)
+            by_level[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
+            counts = [facts.totals[variant][stage][name] for name in OUTCOMES]
+            line = "threshold = {}"
+            if variant in settings or not best:
+                line = line if stage == "net" else f"[{stage}]\n{line}"
+            yield ThresholdSlider(variant, stage, now, line, counts, by_level)
 
 
 def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
@@ -269,6 +334,45 @@ def _frame_conditions(
             yield "the filter harms" if change > 0 else "the filter helps"
     if blind is not None and rates[focus][TESTED] > blind[TESTED]:
         yield f"{focus} worse than {BASELINE}"
+
+
+def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> Film | None:
+    """Return the video of a drive, of at most ``room`` bytes; None without pictures.
+
+    A long drive is thinned evenly; frames with pictures of all layers are kept.
+    """
+    recording = result.recording
+    if recording is None or not result.pictured:
+        return None
+    scored = {*result.rows["frame"]}
+    there = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
+    chosen = sorted({*evenly(there, FILMED), *_choose_frames(result, PICTURED)})
+    names = [variant.name for variant in recording.variants]
+    finals_of = {variant.name: variant.stages[-1] for variant in recording.variants}
+    probable = [name for name in result.facts.curves if name in names]
+    panels = [
+        *(CAMERA, *[TRUTH_PANEL] * bool(scored)),
+        *map(MASK.format, names),
+        *map(PROBABILITY.format, probable),
+    ]
+
+    def read(frame: int) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
+        on_progress(Progress(bisect_right(chosen, frame), len(chosen), "filming"))
+        yield CAMERA, recording.image(frame)
+        if frame in scored:
+            yield TRUTH_PANEL, shade_truth(recording.truth(frame))
+        for name, stage in finals_of.items():
+            if (mask := result.layer(name, stage, frame)) is not None:
+                yield MASK.format(name), mask * np.uint8(255)
+        for name in probable:
+            if (probability := result.layer(name, "probability", frame)) is not None:
+                yield PROBABILITY.format(name), (probability * 255).astype(np.uint8)
+
+    while True:
+        film = make_film(chosen, panels, lambda frame: dict(read(frame)), room)
+        if len(film.content) <= room or len(chosen) < 2:
+            return film
+        chosen = chosen[::2]
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:

@@ -11,7 +11,15 @@ from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
-from roadeval.jobs.results.frames import BYTES, FramePicker, browsed, evenly, strips_of
+from roadeval.jobs.results.frames import (
+    BYTES,
+    FILM_BYTES,
+    FramePicker,
+    browsed,
+    evenly,
+    film_of,
+    strips_of,
+)
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Report
 from roadeval.report.document import document, page_document
@@ -78,9 +86,13 @@ def page_of(result: Result, on_progress: OnProgress = ignore) -> Report:
     findings = findings_of(result)
     if result.drive is None:
         return page_document(findings, None, PICTURED_OF_FLEET)
-    frames = browsed(result.drive)
+    frames = browsed(result.drive, {})
     room = BYTES - len(page(page_document(findings, frames)))
-    strips = strips_of(result.drive, room, on_progress)
+    film = film_of(result.drive, min(room // 2, FILM_BYTES * len(frames.rows)), on_progress)
+    frames = replace(frames, film=film)
+    strips = strips_of(
+        result.drive, room - len(film.content) * 4 // 3 if film else room, on_progress
+    )
     return page_document(findings, replace(frames, strips=strips))
 
 
