@@ -21,7 +21,7 @@ Section = Callable[[Any], Iterable[Block]]
 SCORED: Final = (
     *(drive.filter_effect, drive.regions, ground.on_the_ground, drive.stages, drive.thresholds),
 )
-"""The sections of a drive with truth, after its figures; without truth there is one on its masks."""
+"""The sections of a drive with truth; without truth there is one on its masks."""
 RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
 """The sections of several cameras of a drive."""
 

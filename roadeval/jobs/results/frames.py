@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -293,8 +294,11 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
             by_level[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
             counts = [facts.totals[variant][stage][name] for name in OUTCOMES]
             line = "threshold = {}"
-            if variant in settings or not best:
-                line = line if stage == "net" else f"[{stage}]\n{line}"
+            if stage == "net":
+                network = json.dumps(settings["net"]["file"])
+                line = f"# for --net {variant}={variant}.toml\nfile = {network}\n{line}"
+            elif stage in settings:
+                line = f"# in the settings of {variant}\n[{stage}]\n{line}"
             yield ThresholdSlider(variant, stage, now, line, counts, by_level)
 
 

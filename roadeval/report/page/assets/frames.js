@@ -48,7 +48,7 @@ class Browser {
     if (range.drive) zoom(...(ends ? ends.slice(1).map(Number) : range.drive));
     if (threshold) this.setLevel(Number(threshold));
     const worst = this.data.worst[choice.focus]?.[0] ?? Number(this.element.dataset.first);
-    this.show(frame ?? this.frame ?? worst, { scroll: scroll && frame !== null, address: null });
+    this.show(frame ?? worst, { scroll: scroll && frame !== null, address: null });
   }
 
   tools() {
