@@ -7,19 +7,24 @@ one sentence, which never gives an interval of a single drive whose frames count
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, defined, in_percent, listing, number, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.evaluation.score.unlabelled import sign_of
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference
-from roadeval.evaluation.tables import final_stages
-from roadeval.results.facts import EstimateFacts, UnlabelledFacts
+from roadeval.evaluation.tables import final_stages, only, scene_ns, values_of, worst
+from roadeval.results.facts import EstimateFacts, Facts, FleetFacts, UnlabelledFacts, focus_of
 from roadeval.results.sentences import FINE, ROUNDING, Rates, is_sure
+from roadeval.runtime.sentence import Sentence
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which never looks at the image"
@@ -28,19 +33,60 @@ FEW: Final = 5
 WEAK: Final = 0.02
 """An error rate from which the preset ``robust`` is worth a try."""
 ROBUST: Final = "robust"
+LOOKED_AT: Final = 10
+"""Frames without truth that are worth a look, at most."""
 NAMED: Final = 5
 """Frames without truth that a verdict names."""
 
 
-def focus_of(variants: Iterable[str]) -> str | None:
-    """Return the variant that a result is about: the first that the user brought, else the first.
+def verdict_on(facts: Facts | FleetFacts) -> str:
+    """Return the verdict on a drive or a fleet, after what does not fit there."""
+    more: dict[str, Any] = {"focus": facts.focus}
+    if isinstance(facts, Facts) and not facts.cameras:
+        more |= {"thresholds": facts.thresholds}
+        more |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
+    told = verdict(facts.totals, facts.effects, **more)
+    return Sentence(" ").join([*facts.misfits, told])
 
-    >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
-    'mine'
+
+AnyFacts = TypeVar("AnyFacts", bound=Facts | FleetFacts)
+
+
+def with_focus(facts: AnyFacts, focus: str, doubts: pd.DataFrame | None = None) -> AnyFacts:
+    """Return facts with another focus, and the verdict on it; nothing is replayed for it.
+
+    ``doubts`` are the rows of ``unlabelled``. The facts of a rig's cameras stay as they are.
     """
-    names = [name for name in variants if name != BASELINE]
-    brought = [name for name in names if name not in (FILTERED, UNFILTERED)]
-    return next(iter([*brought, *names]), None)
+    output = {**facts.run.get("output", {}), "focus": focus}
+    changes: dict[str, Any] = {"run": {**facts.run, "output": output}}
+    known = facts.unlabelled if isinstance(facts, Facts) else None
+    if known and doubts is not None and len(rows := only(doubts, variant=focus)):
+        changes["unlabelled"] = describe_doubts(rows, known.differing)
+    facts = replace(facts, **changes)
+    return replace(facts, verdict=verdict_on(facts))
+
+
+def verdicts(facts: Facts | FleetFacts, doubts: pd.DataFrame | None = None) -> dict[str, str]:
+    """Return the verdict with each variant as the focus; for ``doubts`` see `with_focus`."""
+    names = [*facts.finals] or ([] if doubts is None else values_of(doubts, "variant"))
+    return {name: with_focus(facts, name, doubts).verdict for name in names if name != BASELINE}
+
+
+def describe_doubts(
+    rows: pd.DataFrame, differing: Mapping[str, Mapping[str, float]]
+) -> UnlabelledFacts | None:
+    """Return which frames without truth to look at; None without any.
+
+    ``rows`` are those of ``unlabelled`` of one variant; for ``differing`` see `UnlabelledFacts`.
+    """
+    if not len(rows):
+        return None
+    look_at, sign = [], sign_of(rows)
+    if sign is not None:
+        ranked = worst(rows, LOOKED_AT, sign, scene_ns(rows["stamp_ns"]))
+        look_at = ranked["frame"].tolist()
+    shares = {name: {**others} for name, others in differing.items()}
+    return UnlabelledFacts(len(rows), str(rows["variant"].iloc[0]), sign, look_at, shares)
 
 
 def verdict(
@@ -48,24 +94,25 @@ def verdict(
     effects: Sequence[Effect],
     thresholds: Mapping[str, Mapping[str, Any]] | None = None,
     *,
+    focus: str | None = None,
     unlabelled: UnlabelledFacts | None = None,
     estimated: EstimateFacts | None = None,
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
-    They say how wrong it is and how; which variant is best, if it is another; how it compares with
-    the baseline and with the filter's absence; and what to do next. ``totals`` are rates by variant
-    and stage, empty if nothing was scored; ``effects`` are of final masks at least; ``thresholds``
-    are the best ones, as in `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled``
-    tells which frames to look at. ``estimated`` are rates of the whole drive, from frames that were
-    drawn at random.
+    The focus is by default that of `focus_of`. They say how wrong it is and how; which variant is
+    best, if it is another; how it compares with the baseline and with the filter's absence; and
+    what to do next. ``totals`` are rates by variant and stage, empty if nothing was scored;
+    ``effects`` are of final masks at least; ``thresholds`` are the best ones, as in
+    `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells which frames to look
+    at. ``estimated`` are rates of the whole drive, from frames that were drawn at random.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
     stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
-    focus = focus_of(rates)
+    focus = focus_of(rates, focus)
     if best is None or focus is None:
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
@@ -215,8 +262,8 @@ def _next_step(
     """
     steps = []
     for name, best in thresholds.items():
-        now = rates.get(name, {}).get(f"pooled_{TESTED}", math.nan)
-        if abs(now - best[TESTED]) >= ROUNDING:
+        now = rates.get(name, {}).get(f"pooled_{TESTED}")
+        if defined(now) and abs(now - best[TESTED]) >= ROUNDING:
             digits = 1 if abs(now - best[TESTED]) >= FINE else 2
             lines = "` and `".join(best.get("lines", "").splitlines())
             steps.append(

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from roadeval.errors import RoadevalError
 from roadeval.evaluation.score.scoreboard import Effect
-from roadeval.results.facts import UnlabelledFacts
-from roadeval.results.verdict import describe_change, describe_errors, focus_of, verdict
+from roadeval.results.facts import UnlabelledFacts, focus_of
+from roadeval.results.verdict import describe_change, describe_errors, verdict
 from tests.evaluation.making import a_difference
 
 WORDS = 60
@@ -174,6 +175,27 @@ def test_without_truth_it_says_where_to_look_first():
 )
 def test_the_focus_is_what_the_user_brought(variants, focus):
     assert focus_of(variants) == focus
+
+
+def test_a_focus_that_is_chosen_must_be_there():
+    names = ["filtered", "unfiltered", "mine", "blind"]
+    assert focus_of(names, "unfiltered") == "unfiltered"
+    for wrong, remedy in [("minne", "did you mean mine? There are"), ("blind", "there are")]:
+        with pytest.raises(RoadevalError) as raised:
+            focus_of(names, wrong)
+        assert raised.value.problem == f"there is no variant {wrong}"
+        assert raised.value.remedy == f"{remedy} filtered, unfiltered and mine"
+        assert raised.value.setting == "output.focus"
+
+
+def test_the_verdict_on_a_chosen_focus_speaks_of_it_and_its_own_differences():
+    totals = PAIR | drive(mine=0.019)
+    effects = [*filtered(BETTER, BETTER), *against("blind", mine=BETTER, unfiltered=WORSE)]
+    assert verdict(totals, effects, focus="unfiltered") == (
+        "unfiltered: 12.0 % of the pixels are wrong (91 frames). It misses 24.0 % of the road and "
+        "calls 6.0 % of the rest road. Best here is mine: 1.9 %. That is 9.2 points (7.1 to 11.0 "
+        "on others) worse than blind, which never looks at the image. Next: try --variant robust."
+    )
 
 
 def test_a_share_that_would_read_as_nothing_is_said_in_words():

@@ -23,8 +23,8 @@ from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, fade
 from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
+from roadeval.results.facts import focus_of
 from roadeval.results.sentences import notes
-from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,7 +82,7 @@ class FramePicker:
         self._recording = result.recording
         self._finals = finals(result.rows)
         self._all = values_of(result.rows, "variant")
-        self._focus = focus_of(self._all)
+        self._focus = result.facts.focus
         self._scored = frozenset(result.rows["frame"])
         self._parts: dict[Any, Any] = {}
         if self._focus:
@@ -107,7 +107,7 @@ class FramePicker:
         for frame in numbers if recording else ():
             assert recording is not None
             named = {variant.name: variant for variant in recording.variants}
-            focus = named[focus_of(named) or ""]
+            focus = named[self._result.focus or focus_of(named) or ""]
             final = next(spec for spec in focus.layers if spec.name == focus.stages[-1])
             spec = ERRORS if frame in self._scored else final
             layer = recording.layer(focus.name, spec.name, frame)
@@ -235,30 +235,29 @@ def browsed(result: DriveResult) -> FrameBrowser:
 
 def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
-    frames = result.rows
+    frames, focus = result.rows, result.focus or ""
     if not len(frames):
         doubts = [*rates_by_frame(result.table("unlabelled"), [*SIGNS])]
         seen = {frame for frame, _, _ in doubts}
         stamps = result.recording.stamps if result.recording else {}
         doubts += [(number, stamps[number], {}) for number in result.pictured if number not in seen]
         yield from (
-            NotableFrame(frame, stamp, "", rates)
+            NotableFrame(frame, stamp, focus, rates)
             for frame, stamp, rates in sorted(doubts, key=itemgetter(0))
         )
         return
     for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: rate for name, rate in rates.items() if name != BASELINE}
-        words, conditions = [*notes(others, blind)], [*_frame_conditions(others, blind)]
-        yield NotableFrame(frame, stamp, "", rates, notes=words, conditions=conditions)
+        words, conditions = [*notes(others, blind)], [*_frame_conditions(focus, others, blind)]
+        yield NotableFrame(frame, stamp, focus, rates, notes=words, conditions=conditions)
 
 
 def _frame_conditions(
-    rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
+    focus: str, rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
 ) -> Iterator[str]:
     """Yield what is true of a frame, in words: the health of the focus, and the filter."""
-    focus = focus_of(rates)
-    if focus is None:
+    if focus not in rates:
         return
     health = judge(rates[focus], blind)
     if health is not Health.OK:
@@ -297,7 +296,7 @@ def _choose_frames(result: DriveResult, count: int) -> list[int]:
     scored_frames = {*rows["frame"]}
     there = [number for number in result.pictured if number in scored_frames]
     pictured = there or [*result.pictured]
-    focus = focus_of(values_of(rows, "variant"))
+    focus = result.facts.focus
     count = min(count, len(pictured))
     spread = evenly(pictured, count)
     if focus is None:

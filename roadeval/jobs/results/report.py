@@ -32,11 +32,13 @@ def write_report(
     result: str | Path | Result,
     output: str | Path | None = None,
     *,
+    focus: str | None = None,
     on_progress: OnProgress = ignore,
 ) -> Path:
     """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
 
-    A `RoadevalError` if there is nothing to read there, or the file cannot be written.
+    A `RoadevalError` if there is nothing to read there, or no such focus, or the file cannot be
+    written.
 
     Parameters
     ----------
@@ -46,10 +48,12 @@ def write_report(
     output
         By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
         in ``.html`` gives a page.
+    focus
+        The variant that the report is about; see `roadeval.Result`, which has it if it was opened.
     on_progress
         Called with each pictured frame of a page.
     """
-    opened = result if isinstance(result, Result) else Result(result)
+    opened = result if isinstance(result, Result) else Result(result, focus=focus)
     (source,) = opened.paths
     name = opened.drive.camera if opened.drive else ""
     camera = f"-{as_plain(name)}" if name else ""
