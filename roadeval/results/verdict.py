@@ -13,7 +13,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import counted, defined, in_percent, listing, number, percent
+from roadeval.data.words import DASH, counted, defined, in_percent, listing, number, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.score.unlabelled import sign_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
-BLIND: Final = f"{BASELINE}, which never looks at the image"
+BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
 """Independent frames below which those of one drive say little about other frames."""
 WEAK: Final = 0.02
@@ -100,8 +100,8 @@ def verdict(
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
-    The focus is by default that of `focus_of`. They say how wrong it is and how; which variant is
-    best, if it is another; how it compares with the baseline and with the filter's absence; and
+    The focus is by default that of `focus_of`. They say how wrong it is and how; how it compares
+    with the baseline and with the filter's absence; which variant is best, if it is another; and
     what to do next. ``totals`` are rates by variant and stage, empty if nothing was scored;
     ``effects`` are of final masks at least; ``thresholds`` are the best ones, as in
     `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells which frames to look
@@ -116,6 +116,7 @@ def verdict(
     if best is None or focus is None:
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
+    own = rates[focus][TESTED]
     whole_drive = [*from_labels(estimated, focus)]
     lead = "On these alone: " if whole_drive else ""
     other = f"Best here is {best}: {percent(rates[best][TESTED], 1)} %."
@@ -123,8 +124,8 @@ def verdict(
         [
             *whole_drive,
             f"{lead}{_how_wrong(focus, rates[focus], [*of_focus.values()])}",
-            *([other] if rates[best][TESTED] != rates[focus][TESTED] else []),
             *_compared(focus, of_focus),
+            *([other] if not defined(own) or rates[best][TESTED] < own else []),
             *_next_step(focus, rates, thresholds or {}),
         ]
     )
@@ -191,15 +192,15 @@ def _no_interval(change: Difference) -> str:
 def _points(change: Difference, name: str, *, alone: bool = False) -> str:
     """Return a difference of error rates in points; not ``alone`` with what it is elsewhere.
 
-    >>> _points(Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91), "blind")
-    '2.0 points (1.0 to 3.0 on others) better than blind'
+    >>> _points(Difference(-0.02, -0.05, 0.01, 0.2, 0.95, "frames", 91), "blind")
+    '2.0 points (may be chance) better than blind'
     """
     if change.is_zero:
         return f"exactly as good as {name}"
     doubt, digits = "", 1 if abs(change.mean) >= FINE else 2
     if not alone and change.low is not None and change.high is not None:
         least, most = (_size(end, digits) for end in _ends(change))
-        doubt = f" ({least} to {most} on others)"
+        doubt = f" ({least}{DASH}{most} on others)"
         doubt = doubt if is_sure(change) else " (may be chance)"
     direction = "worse" if change.mean > 0 else "better"
     return f"{_size(change.mean, digits)} points{doubt} {direction} than {name}"
@@ -256,26 +257,22 @@ def _size(fraction: float, digits: int) -> str:
 def _next_step(
     focus: str, rates: Mapping[str, Rates], thresholds: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[str]:
-    """Yield what to do next: set thresholds, or try the preset that is best on real roads.
+    """Yield what to do next: set the threshold, or try the preset that is best on real roads.
 
     A threshold is not told if the error rate would hardly change.
     """
-    steps = []
-    for name, best in thresholds.items():
-        now = rates.get(name, {}).get(f"pooled_{TESTED}")
-        if defined(now) and abs(now - best[TESTED]) >= ROUNDING:
-            digits = 1 if abs(now - best[TESTED]) >= FINE else 2
-            lines = "` and `".join(best.get("lines", "").splitlines())
-            steps.append(
-                f"Set {'its threshold' if name == focus else f'the threshold of {name}'} to "
-                f"{best['threshold']:.2g}, not {best['own']:.2g}: then "
-                f"{in_percent(best[TESTED]):.{digits}f} % are wrong"
-                f"{f' (write `{lines}`)' if lines else ''}."
-            )
-    is_weak = focus in (FILTERED, UNFILTERED) and rates[focus][TESTED] >= WEAK
-    if is_weak and not steps and ROBUST not in rates:
-        steps.append("Next: try --variant robust.")
-    yield from steps
+    own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
+    best = thresholds.get(focus)
+    if best and defined(pooled) and abs(pooled - best[TESTED]) >= ROUNDING:
+        digits = 1 if abs(pooled - best[TESTED]) >= FINE else 2
+        lines = "` and `".join(best.get("lines", "").splitlines())
+        yield (
+            f"Set its threshold to {best['threshold']:.2g}, not {best['own']:.2g}: then "
+            f"{in_percent(best[TESTED]):.{digits}f} % are wrong"
+            f"{f' (write `{lines}`)' if lines else ''}."
+        )
+    elif focus in (FILTERED, UNFILTERED) and ROBUST not in rates and defined(own) and own >= WEAK:
+        yield "Next: try --variant robust."
 
 
 def lowest(rates: Mapping[str, Rates]) -> str | None:
