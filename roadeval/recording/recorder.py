@@ -23,7 +23,6 @@ from typing import Any, Final, NamedTuple, Self
 import rerun as rr
 
 from roadeval.data import (
-    BASELINE,
     ERRORS,
     FINAL_STAGE,
     IGNORE,
@@ -138,16 +137,16 @@ def _numbers(
 
 
 def worst_error(result: FrameResult, layout: Layout) -> float:
-    """Return the greatest error rate of any variant's final mask; -1 for a frame not evaluated.
+    """Return the error rate of the focus's final mask; -1 for a frame not evaluated.
 
-    Without truth it is the doubt in the first variant's mask.
+    Without truth it is the doubt in that mask.
     """
+    names = [layout.focus] if layout.focus else [variant.name for variant in layout.variants]
     if not layout.has_truth:
-        signs = [
-            sign for doubt in result.doubts[:1] for sign in (doubt.entropy, doubt.disagreement)
-        ]
+        doubts = [doubt for doubt in result.doubts if doubt.variant in names]
+        signs = [sign for doubt in doubts[:1] for sign in (doubt.entropy, doubt.disagreement)]
         return next((sign for sign in signs if not math.isnan(sign)), -1.0)
-    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
+    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant in names)
     return max((t.rates[TESTED] for t in finals), default=-1.0)
 
 

@@ -17,7 +17,7 @@ from pypdf import PdfReader
 
 from roadeval import Recording
 from roadeval.data import ERRORS
-from roadeval.jobs.results import frames
+from roadeval.jobs.results import page
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.report.images import LayerImage, paint
@@ -432,8 +432,8 @@ def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
 
 
 def test_without_truth_the_frames_to_look_at_are_pictured_first(unlabelled, monkeypatch):
-    monkeypatch.setattr(frames, "PICTURED", 3)
-    strips = frames.strips_of(DriveResult(unlabelled.recording), 10**9)
+    monkeypatch.setattr(page, "PICTURED", 3)
+    strips = page.strips_of(DriveResult(unlabelled.recording), 10**9)
     look_at = unlabelled.summary["unlabelled"]["look_at"]
     assert [each.frame for each in strips] == sorted(look_at[:3])
 

@@ -22,6 +22,7 @@ def report(
             callback=arguments.ending_in(".pdf", ".html", unnamed=(".htm", "")),
         ),
     ] = None,
+    focus: arguments.Focus = None,
     camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -34,7 +35,7 @@ def report(
     from roadeval.jobs.results.report import write_report
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.select_camera(Result(result), camera)
+    opened = arguments.select_camera(Result(result, focus=focus), camera)
     with progress.show(quiet) as watch:
         path = write_report(opened, output, on_progress=watch)
     if not quiet:

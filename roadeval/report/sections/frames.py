@@ -31,7 +31,6 @@ from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.tables import variant_cell
 from roadeval.results.sentences import step_by_step, without_filter
-from roadeval.results.verdict import focus_of
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -43,7 +42,7 @@ MOST: Final = 6
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, and the frames that the filter changed most."""
-    focus = focus_of(findings.finals)
+    focus = findings.facts.focus
     if focus is None:
         if (doubt := findings.facts.unlabelled) and doubt.sign:
             meaning = SIGNS[doubt.sign]
@@ -189,6 +188,7 @@ class FrameBrowser(Block):
     """The video of the drive; None without a recording."""
     counts: Mapping[str, Mapping[int, Sequence[int]]] = field(default_factory=dict)
     """TP, TN, FP and FN of each variant's final mask, by frame."""
+    focus: str = ""
     verdicts: Mapping[str, str] = field(default_factory=dict)
     """The verdict on each variant, if it is the focus."""
     worst: Mapping[str, Sequence[int]] = field(default_factory=dict)
@@ -206,7 +206,7 @@ class FrameBrowser(Block):
                 for name, by_frame in self.counts.items()
             },
             "variants": [*self.variants],
-            "focus": focus_of(self.variants) or "",
+            "focus": self.focus,
             "verdicts": {**self.verdicts},
             "worst": {**self.worst},
             "thresholds": {slider.variant: slider.as_json() for slider in self.thresholds},

@@ -26,7 +26,6 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
-from roadeval.results.verdict import focus_of
 
 LOSSES: Final = 3
 """Most losses that are named."""
@@ -64,7 +63,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
         legend = caption("thumbnails without truth")
-        if focus := focus_of(findings.finals):
+        if focus := findings.facts.focus:
             legend = caption("thumbnails", variant=focus, errors=caption("errors"))
         yield ImageGrid(pictures, 4, caption=legend)
     yield _beware([*warnings(findings)])
