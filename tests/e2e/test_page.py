@@ -72,6 +72,7 @@ def table(tab):
 def drag(tab, chart, start, end):
     """Drag over a part of a chart, from and to shares of its width."""
     chart.scroll_into_view_if_needed()
+    tab.wait_for_timeout(200)
     box = chart.bounding_box()
     tab.mouse.move(box["x"] + box["width"] * start, box["y"] + box["height"] / 2)
     tab.mouse.down()
