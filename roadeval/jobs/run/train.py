@@ -86,5 +86,7 @@ def draw(
             total = missing + len(frames)
             losses.append(f"{missing} of {total} training frames could not be decoded")
         if losses and not frames:
-            raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
+            raise TrainingError(
+                f"no training frame could be decoded: {losses[0]}", where=log.path.name
+            )
         return frames, losses
