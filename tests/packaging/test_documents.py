@@ -307,7 +307,7 @@ def final(fleet):
 def fleets(tmp_path_factory):
     """A folder with a fleet."""
     folder = tmp_path_factory.mktemp("fleets")
-    fleet_of(folder / "monday", 30, frames=5)
+    fleet_of(folder / "monday", 12, frames=5)
     return folder
 
 

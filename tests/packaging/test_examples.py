@@ -40,8 +40,9 @@ def test_the_example_method_is_installed_and_replayed_by_its_entry_point(tmp_pat
          "--target", tmp_path / "site", tmp_path / "method")  # fmt: skip
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
     log = drive.write(tmp_path / "drive.mcap", frames=14)
+    (tmp_path / "plain.toml").write_text("training.frames = 4\noutput.figures = false\n")
     _run("-m", "roadeval", "replay", log, "--variant", f"mine={tmp_path / 'method/smooth.toml'}",
-         "--train-frames", "4", "--save", "out.rrd", "--reports", "reports",
+         "--config", "plain.toml", "--save", "out.rrd", "--reports", "reports",
          cwd=tmp_path, env=environment)  # fmt: skip
     rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
     assert set(rows.stage) == {"smooth", "post"}
