@@ -13,9 +13,9 @@ from PIL import Image
 import roadeval
 from roadeval.config.run import configure
 from roadeval.logs.log import open_log
-from roadeval.logs.truth.drawn import Proposal
 from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import Picks, Why
+from roadeval.logs.truth.shapes import Proposal
 from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from roadeval.data import ROAD, Truth
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import first_names
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
 PICK: Final = "pick.json"

@@ -21,9 +21,9 @@ from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
-from roadeval.logs.truth.names import LabelSet, NamedLabel
+from roadeval.logs.truth.named_labels import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
+from roadeval.logs.truth.shapes import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.runtime.discovery import collect
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
