@@ -438,8 +438,8 @@ class Recorder:
         """Raise a `RecordingError`, caused by an ENOSPC, if the disk is full or nearly full."""
         if self._room() < self._rows.size:
             raise RecordingError(
-                f"{self.path}: cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must "
-                "stay free)"
+                f"cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must stay free)",
+                where=self.path,
             ) from _failure(errno.ENOSPC)
 
     def _room(self) -> float:
@@ -545,7 +545,9 @@ class Recorder:
 
     def _incomplete(self) -> RecordingError:
         refusal = self._refusal() or _failure(errno.EIO)
-        error = RecordingError(f"{self.path}: cannot be written any further: {refusal.strerror}")
+        error = RecordingError(
+            f"cannot be written any further: {refusal.strerror}", where=self.path
+        )
         error.__cause__ = refusal
         return error
 
