@@ -26,7 +26,6 @@ from roadeval.report.blocks import (
     Heading,
     Report,
     Table,
-    TableOfContents,
     Text,
     blocks_as_markdown,
 )
@@ -72,7 +71,6 @@ def document(
             Heading("What changed"),
             *overview(comparison, judgements),
             *_warnings(comparison),
-            TableOfContents(depth=2),
             *_figures(comparison, over_drive),
             *_details(comparison, inspect),
         ],
@@ -145,7 +143,7 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
                             rate,
                             percent(row.base[rate]),
                             percent(row.new[rate]),
-                            Cell(points(change.mean), bold=row.final and first),
+                            points(change.mean),
                             marked_interval(change),
                         ]
                     )
@@ -231,7 +229,7 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
             "stamp": lambda row: timestamp(row.stamp_ns),
             "ERR base": lambda row: percent(row.base),
             "new": lambda row: percent(row.new),
-            "difference": lambda row: Cell(points(row.change), bold=True),
+            "difference": lambda row: points(row.change),
         }
         if inspect:
             columns[_COMMAND] = lambda row: inspect(row.result, row.frame)
@@ -261,7 +259,7 @@ def _change(ends: Callable[[Any], str]) -> Columns:
     cells: tuple[Callable[[Any], Cell | str], ...] = (
         lambda row: percent(row.base),
         lambda row: percent(row.new),
-        lambda row: Cell(points(row.difference.mean), bold=True),
+        lambda row: points(row.difference.mean),
         ends,
     )
     return dict(zip(CHANGE, cells, strict=True))

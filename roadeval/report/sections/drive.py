@@ -115,7 +115,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
         rows.append(
             [
                 variant_cell(name, [*findings.finals]),
-                Cell(percent(flicker), bold=True),
+                percent(flicker),
                 percent(measured["truth_flicker"]),
                 points(flicker - measured["truth_flicker"]) if defined(flicker) else DASH,
                 *(number(measured[count]) for count in ("pairs", "episodes")),
@@ -173,7 +173,7 @@ def stages(findings: Findings) -> Iterator[Block]:
             [
                 variant_cell(variant, [*findings.totals]),
                 *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
-                Cell(percent(findings.total(variant)[TESTED]), bold=True),
+                percent(findings.total(variant)[TESTED]),
             ]
             for variant, parts in findings.error_parts.items()
         ],
@@ -206,7 +206,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
                 variant_cell(row["variant"], [*findings.totals]),
                 f"perfect {row['oracle']}",
                 percent(row["as_is"]),
-                Cell(percent(row[TESTED]), bold=True),
+                percent(row[TESTED]),
                 points(row[TESTED] - row["as_is"]),
                 *(percent(row[name]) for name in OTHERS),
                 number(row["frames"]),
