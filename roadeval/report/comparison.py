@@ -210,7 +210,9 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         yield from _plot(comparison)
         yield from changed_drives(comparison)
     if comparison.regions:
-        legend = correction(row.difference for row in comparison.regions)
+        changes = [row.difference for row in comparison.regions]
+        why = sentences.why_unsure(changes)
+        legend = correction(changes) or f"{why[:1].upper()}{why[1:]}."
         yield Heading("Where it is better, and where worse", 2)
         if rows := [row for row in comparison.regions if not row.difference.is_zero]:
             columns: Columns = {
@@ -241,8 +243,11 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
     for (result, variant), changes in _by_mask(comparison).items():
         if rows := [row for row in changes if row.changed]:
             shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
-            title = f"{variant} of {result}" if len(comparison.results) > 2 else variant
-            yield Heading(f"Drives on which {title} changed{shown}, the surest first", 2)
+            of = f" of {result}" if len(comparison.results) > 2 else ""
+            title = f"{variant}{of} changed"
+            if result == variant:  # variants of one result
+                title = f"{variant} differs from {comparison.results[0].label}"
+            yield Heading(f"Drives on which {title}{shown}, the surest first", 2)
             columns: Columns = {
                 "drive": lambda row: row.drive,
                 "frames": lambda row: number(row.frames),
