@@ -6,9 +6,8 @@ import pytest
 
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison.compare import DriveChange, RegionChange
+from roadeval.evaluation.comparison.compare import RegionChange
 from roadeval.evaluation.comparison.conditions import Condition
-from roadeval.report.comparison import changed_drives
 from roadeval.results import comparison
 from roadeval.results.comparison import (
     changed_settings,
@@ -61,15 +60,6 @@ def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
 def test_why_no_region_is_sure_is_told(row, why):
     part = RegionChange("new", "net", "lit", "in light", 12, 0.1, 0.2, row)
     assert why in comparison.where(a_comparison(a_change(WORSE, "net"), regions=(part,)))[0]
-
-
-@pytest.mark.parametrize(
-    ("result", "title"), [("net", "net differs from base"), ("new", "net changed")]
-)
-def test_drives_on_which_a_mask_differs_are_headed_by_the_two(result, title):
-    row = DriveChange(result, "net", "post", "street", 12, 0.1, 0.2, WORSE, 0.01, changed=True)
-    heading, _ = changed_drives(a_comparison(a_change(WORSE, "net", result), drives=(row,)))
-    assert heading.text == f"Drives on which {title}, the surest first"
 
 
 def test_changed_settings_are_told_of_each_result_and_some_of_many():
