@@ -344,7 +344,7 @@ _OUTCOME_COLOURS: Final[Mapping[str, Colour]] = {
     "N": colours.GREY,
 }
 _ERRORS: Final = """\
-**Errors:** *green* road found, *orange* non-road called road (FP), *purple* road missed (FN),
+**Errors:** *green* road found, *orange-red* non-road called road (FP), *pink* road missed (FN),
 *grey* ignored.
 """
 _ROW_GUIDE: Final = """\

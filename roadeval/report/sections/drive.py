@@ -19,7 +19,7 @@ from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import figures_over_drive
+from roadeval.report.charts.standard import describe_points, figures_over_drive
 from roadeval.report.findings import Findings
 from roadeval.report.images import example_grid, heat_map
 from roadeval.report.tables import (
@@ -44,9 +44,12 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     blocks: list[Block] = []
     if rows:
         legend = caption("claims", window=findings.facts.evaluation.window)
-        blocks.append(Table(["claim", "borne out by"], rows, caption=legend))
+        blocks.append(Table(["claim", "true in"], rows, caption=legend))
     if findings.examples:
         blocks.append(example_grid(findings.examples, caption("figure 2")))
+    if len(findings.windows):
+        points = describe_points(findings.windows)
+        blocks.append(Text(f"Below, {points}.", "note"))
     blocks += [
         Figure(charts, figure.caption)
         for figure in figures_over_drive()
@@ -54,14 +57,16 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     ]
     if blocks:
         yield Heading("Over the drive")
-        yield Details("The paper's claims, and its figures 2, 3a and 3b", blocks)
+        of_paper = "The paper's claims, and its figures 2, 3a and 3b"
+        yield Details(of_paper if rows else "Masks and rates along the drive", blocks)
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield the effects of the filter and the variants, and how much masks flicker."""
     effects = findings.facts.final_effects
     if effects:
-        yield Heading("What the filter and the variants change")
+        filter_too = "the filter and " * (FILTERED in findings.finals)
+        yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
         yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
     pairs = tables.changes(findings.table("frames"), FILTERED, UNFILTERED)
