@@ -22,6 +22,7 @@ from roadeval.report.captions import caption
 from roadeval.report.chart import (
     BETTER,
     FAINT,
+    POINTS,
     WORSE,
     Chart,
     ChartKind,
@@ -72,6 +73,29 @@ def over_windows(
     """Return a chart of each rate: each variant's final mask, window by window."""
     middles = (windows["first_frame"] + windows["last_frame"]) / 2
     return over_frames(windows.assign(frame=middles), rates, by_variant)
+
+
+def short_end(windows: pd.DataFrame, most: int = POINTS) -> tuple[int, float, float] | None:
+    """Return the frames of the last point, if they are fewer, and the numbers of both its ends.
+
+    ``windows`` are drawn as at most so many points, each the mean of neighbours.
+    """
+    spans = windows.groupby("window")[["first_frame", "last_frame", "frames"]].agg(
+        {"first_frame": "min", "last_frame": "max", "frames": "max"}
+    )
+    rows = -(-len(spans) // most)
+    last = spans.iloc[(len(spans) - 1) // rows * rows :]
+    if (frames := int(last["frames"].sum())) >= rows * spans["frames"].max():
+        return None
+    return frames, last["first_frame"].min() - 0.5, last["last_frame"].max() + 0.5
+
+
+def describe_points(windows: pd.DataFrame, most: int = POINTS) -> str:
+    """Return how many frames a point of a chart over the drive stands for, as a clause."""
+    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // most)
+    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    short = short_end(windows, most)
+    return f"each point is the mean of {point}{f', the last of {short[0]}' if short else ''}"
 
 
 def over_frames(

@@ -19,7 +19,7 @@ from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import figures_over_drive
+from roadeval.report.charts.standard import describe_points, figures_over_drive
 from roadeval.report.findings import Findings
 from roadeval.report.images import example_grid, heat_map
 from roadeval.report.tables import (
@@ -44,9 +44,12 @@ def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
     blocks: list[Block] = []
     if rows:
         legend = caption("claims", window=findings.facts.evaluation.window)
-        blocks.append(Table(["claim", "borne out by"], rows, caption=legend))
+        blocks.append(Table(["claim", "true in"], rows, caption=legend))
     if findings.examples:
         blocks.append(example_grid(findings.examples, caption("figure 2")))
+    if len(findings.windows):
+        points = describe_points(findings.windows)
+        blocks.append(Text(f"Below, {points}.", "note"))
     blocks += [
         Figure(charts, figure.caption)
         for figure in figures_over_drive()
@@ -55,14 +58,16 @@ def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
     if blocks and heading:
         yield Heading("Over the drive")
     if blocks:
-        yield Details("The paper's claims, and its figures 2, 3a and 3b", blocks)
+        of_paper = "The paper's claims, and its figures 2, 3a and 3b"
+        yield Details(of_paper if rows else "Masks and rates along the drive", blocks)
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield the effects of the filter and the variants, and how much masks flicker."""
     effects = findings.facts.final_effects
     if effects:
-        yield Heading("What the filter and the variants change")
+        filter_too = "the filter and " * (FILTERED in findings.finals)
+        yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
         yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
     pairs = tables.changes(findings.table("frames"), FILTERED, UNFILTERED)
@@ -117,7 +122,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
         rows.append(
             [
                 variant_cell(name, [*findings.finals]),
-                Cell(percent(flicker), bold=True),
+                percent(flicker),
                 percent(measured["truth_flicker"]),
                 points(flicker - measured["truth_flicker"]) if defined(flicker) else DASH,
                 *(number(measured[count]) for count in ("pairs", "episodes")),
@@ -176,7 +181,7 @@ def stages(findings: Findings) -> Iterator[Block]:
             [
                 variant_cell(variant, [*findings.totals]),
                 *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
-                Cell(percent(findings.total(variant)[TESTED]), bold=True),
+                percent(findings.total(variant)[TESTED]),
             ]
             for variant, parts in findings.error_parts.items()
         ],
@@ -209,7 +214,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
                 variant_cell(row["variant"], [*findings.totals]),
                 f"perfect {row['oracle']}",
                 percent(row["as_is"]),
-                Cell(percent(row[TESTED]), bold=True),
+                percent(row[TESTED]),
                 points(row[TESTED] - row["as_is"]),
                 *(percent(row[name]) for name in OTHERS),
                 number(row["frames"]),

@@ -11,6 +11,7 @@ import pytest
 from roadeval.data import ERRORS
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.report.blocks import (
+    Cell,
     Command,
     Details,
     Figure,
@@ -22,6 +23,7 @@ from roadeval.report.blocks import (
     plain,
 )
 from roadeval.report.captions import caption
+from roadeval.report.charts import standard as charts
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
@@ -29,7 +31,7 @@ from roadeval.report.sections.drive import filter_effect, regions, thresholds
 from roadeval.report.sections.frames import FrameBrowser, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
 from roadeval.report.sections.summary import warnings
-from roadeval.report.tables import rates_table
+from roadeval.report.tables import differences_table, rates_table, stages_table
 from roadeval.results.facts import TrainingFacts
 from roadeval.results.tables import read_table
 from tests.evaluation.making import a_table
@@ -258,3 +260,18 @@ def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
     assert set(windows["frames"][:-1]) == {size}
     assert len(windows) == rows
     assert windows["frames"].sum() == frames
+
+
+def test_a_variant_has_one_mark_in_tables_and_charts():
+    findings = some_findings()
+    marks = {row[0].text: row[0].look for row in rates_table(findings.facts).rows}
+    for chart in charts.stages(findings.totals):
+        assert {series.name: series.look for series in chart.series} == marks
+
+
+def test_bold_is_the_best_and_nothing_else():
+    effect = Effect("unfiltered", "filtered", "post", True, by_rate(err=a_difference(-0.02)))
+    facts = some_findings(effects=[effect]).facts
+    tables = stages_table(facts.totals), differences_table(facts)
+    cells = [cell for table in tables for row in table.rows for cell in row]
+    assert [cell for cell in cells if isinstance(cell, Cell) and cell.bold] == []
