@@ -50,6 +50,9 @@ def compare(
 ) -> int:
     """Compare results with the first, or the variants of one.
 
+        roadeval compare old.rrd new.rrd
+        roadeval compare old.rrd new.rrd --fail-if "post.filtered.ERR > +0.5pp"
+
     Drives are paired by name or log, and frames by stamp. Frames that trained either result are
     left out. One drive is judged over its frames, several drives are judged over the drives.
     Results of different drives are not compared. Exit code 4 if a --fail-if condition holds; 1 if

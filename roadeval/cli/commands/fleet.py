@@ -40,6 +40,9 @@ def fleet(
 ) -> int:
     """Replay many drives and judge them together.
 
+        roadeval fleet drives/ -o all
+        roadeval fleet drives/ -o all --variant robust --jobs 4
+
     The drives are replayed on this machine or on a cluster. The same command again replays only
     what is missing or has changed. A drive that cannot be used is a row with the reason, and the
     exit code is 3 then.

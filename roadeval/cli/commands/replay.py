@@ -19,6 +19,10 @@ def replay(
 ) -> int:
     """Replay a log; record, score and plot every step.
 
+        roadeval replay drive.mcap
+        roadeval replay drive.mcap --truth labels/ --net mine=net.onnx
+        roadeval replay drive.mcap --variant robust --save robust.rrd
+
     Every intermediate goes into a recording for the Rerun viewer. If the log has truth, each stage
     is scored against it, with the shadow filter and without.
     """

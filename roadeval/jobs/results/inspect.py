@@ -20,7 +20,7 @@ from roadeval.results.fleet import FleetFolder, recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
 from roadeval.results.verdict import focus_of
-from roadeval.runtime.text import visible, without_secrets
+from roadeval.runtime.text import likely, visible, without_secrets
 
 LISTED: Final = 10
 """Frames that are listed by default."""
@@ -105,7 +105,8 @@ def _ranked(
         raise _nothing_scored(drive.path)
     chosen = variant or focus_of(names) or names[0]
     if chosen not in names:
-        raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
+        choice = f"{likely(chosen, names)}there are {', '.join(names)}"
+        raise RoadevalError(f"no variant {chosen}", where=drive.path, remedy=choice)
     masks = finals(only(rows, variant=chosen))
     by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
