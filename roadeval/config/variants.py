@@ -147,7 +147,8 @@ def check_tables(tables: Mapping[str, Any], allowed: Collection[str]) -> None:
         if key in allowed:
             continue
         if isinstance(table, Mapping):
-            raise ConfigError(f"[{key}] is no table here", remedy=f"choose {names}")
+            meant = likely(key, allowed)
+            raise ConfigError(f"[{key}] is no table here", remedy=f"{meant}choose {names}")
         raise ConfigError(f"{key} is in no table", remedy=f"put it below one of {names}")
 
 
