@@ -49,6 +49,7 @@ def fleet(
     """
     config = arguments.configuration(options)
     from roadeval.cli.screens import fleet as screen
+    from roadeval.cli.screens.tables import show_verdict
     from roadeval.jobs.run.fleet import replay_fleet as run
 
     with progress.show(quiet) as watch:
@@ -60,4 +61,13 @@ def fleet(
     messages.warn_of_missing_loops()
     for sentence in screen.problems(outcome):
         messages.warning(sentence)
+    if lines := [*screen.manifest(outcome.facts)]:
+        messages.note(
+            "labels differ from drive to drive: state `labels` in a manifest, as drives.toml, and "
+            "give that in place of the drives"
+        )
+        for line in lines:
+            console.diagnostics().print(line, soft_wrap=True)
+    if not (json or quiet):
+        show_verdict(outcome.facts, console.results())
     return ExitCode.LOSS if outcome.lost else ExitCode.DONE

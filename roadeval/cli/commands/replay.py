@@ -41,4 +41,6 @@ def replay(
     messages.warn_of_missing_loops()
     for warning in outcome.warnings:
         messages.warning(warning)
+    if not (json or quiet):
+        screen.show_verdict(outcome.facts, console.results())
     return messages.losses(outcome.losses)
