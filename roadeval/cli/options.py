@@ -259,6 +259,8 @@ def with_flags(text: str) -> str:
         match setting.split(".", 2):
             case "masks", name, key:
                 return f"`{key}` in the file of {FLAGS['masks']} {name}=FILE.toml"
+            case "net", key:
+                return f"`{key}` in the file of {FLAGS['nets']} NAME=FILE.toml"
             case "topics", "masks", name:
                 return f"{FLAGS['topics.masks']} {name}"
         return FLAGS.get(setting, f"`{setting}`")
