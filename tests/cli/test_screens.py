@@ -132,7 +132,7 @@ def test_a_verdict_is_green_if_the_focus_beats_the_baseline_and_red_if_not(chang
     )
     out = Console(file=io.StringIO(), width=80, force_terminal=True, color_system="standard")
     outcome.show_verdict(facts, out)
-    assert out.file.getvalue() == f"\x1b[1{colour and ';'}{colour}mIt is so.\x1b[0m\n"
+    assert out.file.getvalue() == f"\n\x1b[1{colour and ';'}{colour}mIt is so.\x1b[0m\n"
 
 
 def test_headings_of_several_words_have_lines_before_a_table_is_divided():

@@ -76,5 +76,7 @@ def compare(
     for warning in compared.comparison.warnings:
         if warning not in compared.lost:
             messages.warning(warning)
+    if not (json or quiet):
+        screen.show_verdict(compared.comparison, console.results())
     lost = messages.losses(compared.lost)
     return messages.conditions(compared.held, compared.unjudged) or lost

@@ -55,7 +55,6 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     folder = quote(str(outcome.folder))
     page = f"roadeval report {folder} -o {quote(f'{outcome.folder.name}.html')}"
     console.show_next(out, page, *([f"roadeval inspect {folder} --list"] if facts.totals else []))
-    out.print()
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:

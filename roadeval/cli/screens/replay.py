@@ -39,7 +39,6 @@ def show(outcome: Outcome, out: Console) -> None:
         tables.show([*_score_tables(facts, outcome.metres)], out)
         out.print()
     _show_files(outcome, out)
-    out.print()
 
 
 def show_verdict(facts: Facts, out: Console) -> None:
@@ -47,6 +46,7 @@ def show_verdict(facts: Facts, out: Console) -> None:
     if facts.totals:
         tables.show_verdict(facts, out)
         return
+    out.print()
     for sentence in facts.misfits:
         out.print(with_flags(sentence))
     why = "every frame with road truth was trained on or left out"

@@ -51,6 +51,7 @@ def show_verdict(facts: Facts | FleetFacts, out: Console) -> None:
             style = "bold green" if effect.rates[TESTED].mean < 0 else "bold red"
     if isinstance(facts, Facts) and facts.misfits:
         style = "bold yellow"
+    out.print()
     out.print(with_flags(facts.verdict), style=style)
 
 
