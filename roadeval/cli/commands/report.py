@@ -62,6 +62,9 @@ def report(
 ) -> int:
     """Write the report of a drive or of a fleet, as a PDF or as a page.
 
+        roadeval report recordings/drive.rrd -o drive.html
+        roadeval report reports/drive -o drive.pdf
+
     It shows whether the filter helps, where the errors are, which stage causes them, and which
     frames to look at. A recording is enough; the report of a results folder has no pictures. A
     page is one file that needs no network and no server.
