@@ -45,6 +45,7 @@ def drive(demo, tmp_path_factory):
 def fleet(tmp_path_factory):
     """The page of a fleet whose drives have pictures."""
     folder = fleet_of(tmp_path_factory.mktemp("fleet") / "week", 24, pictures=24)
+    (next(folder.glob("results/*0013*/")) / "report.html").write_text("the page of a drive")
     path = folder.with_name("index.html")
     run = here("report", folder, "-o", path)
     assert run.returncode == 0, run.stderr
@@ -412,6 +413,14 @@ def test_a_fleets_page_has_every_drive_and_finds_one(fleet, watched):
     assert re.fullmatch(r"Worst frame: \w+, frame \d+ \(ERR \d+\.\d %\)", link.inner_text())
     place = seen.tab.locator(link.get_attribute("href"))
     assert place.locator("h2").inner_text() == "The worst frames over all drives"
+    drives = seen.tab.locator(".drive")
+    assert drives.count() == told["counts"]["scored"] + told["counts"]["damaged"]
+    assert drives.first.locator("img").count() == 3
+    assert drives.first.locator("a").inner_text() == "drive_0013"
+    assert seen.tab.locator(".drive a").count() == 1
+    drives.first.locator("a").click()
+    assert seen.tab.inner_text("body") == "the page of a drive"
+    seen.tab.go_back()
     pictures = seen.tab.locator(".grid img")
     assert pictures.count() > 5
     pictures.first.scroll_into_view_if_needed()
