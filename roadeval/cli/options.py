@@ -32,44 +32,47 @@ OptionValues = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class MethodSettings:
-    """Options that stand for more than one setting; `roadeval.cli.arguments` reads them."""
+    """Options that stand for more than one setting; `roadeval.cli.arguments` reads them.
+
+    preset: Preset to start from: the equations as meant (the default), the misprints taken
+        literally, the paper with its own order of post-processing, the paper with shadow
+        compensated in HSI, a more careful shadow filter, or a pipeline for use on the road.
+    config: File of settings on top of the preset: an edited output of 'roadeval config', the
+        run.toml of an earlier run, or the recording of that run.
+    variants: Further variant beside filtered and unfiltered, from a file or a preset.
+    nets: Network as a further variant: an ONNX file, or a TOML file with its settings, as the size
+        of its input.
+    masks: Masks as a further variant: of a folder, of another log, or of a TOML file that states
+        their path and more, as a threshold of confidences.
+    tunes: Method, as a network, that is corrected in a further variant NAME_tuned, which learns
+        from this drive's first labelled frames. Its trees use the method's output and all features
+        of the preset robust, and learn where the method errs.
+    only: Variant to run, masks included; the others are left out. If none of them learns anything,
+        no frame is used for training.
+    cameras: Topic of the camera, if the log has several. If it is given again, each camera is
+        replayed, scored by itself, and recorded beside the others.
+    ground: File of the camera's height, angles and lens, if the log lacks them: with these, errors
+        are counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration or of
+        Kalibr.
+    """
 
     preset: Annotated[
         str | None, Flag("--preset", "paper|printed|printed_order|hsi|gated|robust")
     ] = None
-    """Preset to start from: the equations as meant (the default), the misprints taken literally,
-    the paper with its own order of post-processing, the paper with shadow compensated in HSI, a
-    more careful shadow filter, or a pipeline for use on the road."""
     config: Annotated[Path | None, Flag("--config", "FILE.toml")] = None
-    """File of settings on top of the preset: an edited output of 'roadeval config', the run.toml of
-    an earlier run, or the recording of that run."""
     variants: Annotated[
         Mapping[str, str | None], Flag("--variant", "NAME=FILE.toml|NAME=PRESET|PRESET")
     ] = dataclasses.field(default_factory=dict)
-    """Further variant beside filtered and unfiltered, from a file or a preset."""
     nets: Annotated[Mapping[str, str], Flag("--net", "NAME=FILE")] = dataclasses.field(
         default_factory=dict
     )
-    """Network as a further variant: an ONNX file, or a TOML file with its settings, as the size of
-    its input."""
     masks: Annotated[Mapping[str, str], Flag("--masks", "NAME=FOLDER|LOG:TOPIC|FILE.toml")] = (
         dataclasses.field(default_factory=dict)
     )
-    """Masks as a further variant: of a folder, of another log, or of a TOML file that states their
-    path and more, as a threshold of confidences."""
     tunes: Annotated[tuple[str, ...], Flag("--tune", "NAME")] = ()
-    """Method, as a network, that is corrected in a further variant NAME_tuned, which learns from
-    this drive's first labelled frames. Its trees use the method's output and all features of the
-    preset robust, and learn where the method errs."""
     only: Annotated[tuple[str, ...], Flag("--only", "NAME")] = ()
-    """Variant to run, masks included; the others are left out. If none of them learns anything, no
-    frame is used for training."""
     cameras: Annotated[tuple[str, ...], Flag("--image-topic", "T", "Input")] = ()
-    """Topic of the camera, if the log has several. If it is given again, each camera is replayed,
-    scored by itself, and recorded beside the others."""
     ground: Annotated[Path | None, Flag("--camera", "FILE", "Input")] = None
-    """File of the camera's height, angles and lens, if the log lacks them: with these, errors are
-    counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration or of Kalibr."""
 
 
 GROUPS: Final = ("Output", "Methods", "Training", "Truth", "Range", "Input", "Execution", "Fleet")
