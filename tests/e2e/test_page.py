@@ -45,7 +45,9 @@ def drive(demo, tmp_path_factory):
 def fleet(tmp_path_factory):
     """The page of a fleet whose drives have pictures."""
     folder = fleet_of(tmp_path_factory.mktemp("fleet") / "week", 24, pictures=24)
-    (next(p for p in folder.glob("results/drive_0013*") if p.is_dir()) / "report.html").write_text("the page of a drive")
+    (next(p for p in folder.glob("results/drive_0013*") if p.is_dir()) / "report.html").write_text(
+        "the page of a drive"
+    )
     path = folder.with_name("index.html")
     run = here("report", folder, "-o", path)
     assert run.returncode == 0, run.stderr
