@@ -64,7 +64,8 @@ def plots(findings: FleetFolder) -> Iterator[Block]:
         plot = [forest(rows, effect.rates[TESTED], label)] if len(rows) else []
         yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
     blocks = [drives_table(findings, NAMED), note("units")]
-    yield Details("Drives with the highest error rate", blocks)
+    focus = focus_of(findings.finals)
+    yield Details(f"Drives with the highest error rate of {focus}", blocks)
 
 
 def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
@@ -316,6 +317,6 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
             ]
             for row in rows
         ],
-        text_columns=(0, 1, 4),
+        text_columns=(0, 1, 2, 3, 4),
         small=True,
     )
