@@ -56,7 +56,7 @@ class WorstFrame:
 def worst_frames(
     result: Result, count: int | None = None, variant: str | None = None
 ) -> list[WorstFrame]:
-    """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
+    """Rank the worst frames by ERR of a final mask; of each scene only the worst counts.
 
     The mask is that of the focus by default. If nothing was scored, frames are ranked by how much
     it is in doubt, one a scene. Of a fleet the frames of all drives are ranked together, all that
@@ -111,7 +111,7 @@ def _ranked(
     by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
         return []
-    apart = None if by == TESTED else tables.scene_ns(rows["stamp_ns"])
+    apart = tables.scene_ns(rows["stamp_ns"])
     looked_at = masks if among is None else masks[masks["frame"].isin([*among])]
     ranked = tables.worst(looked_at, count, by, apart).to_dict("records")
     parts: dict[Any, Any] = {}
@@ -174,7 +174,7 @@ def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame
         (path,) = result.paths
         raise RoadevalError(
             f"{path}: there is no worst frame number {rank}: {len(frames)} are ranked, of "
-            "neighbouring frames the worst alone"
+            "each scene the worst alone"
         )
     return frames[-1]
 

@@ -380,8 +380,8 @@ def _draw_frames(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str,
 
 WORST: Final = 3
 """Frames of a drive that are kept as its worst."""
-APART_NS: Final = 1_000_000_000
-"""Neighbours fail alike: of frames less than this apart only the worst is kept."""
+APART_NS: Final = 3_000_000_000
+"""Frames of a scene fail alike: of those less than this apart only the worst is kept."""
 WIDTH: Final = 320
 """Pixels across their pictures."""
 
