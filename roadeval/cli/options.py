@@ -280,8 +280,11 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
 
     def decorate(command: Callable[..., int]) -> Callable[..., int]:
         @wraps(command)
-        def run(*args: Any, **values: Any) -> int:
-            read = {o.setting: o.value(values.pop(o.argument, None)) for o in taken}
+        def run(*args: Any, context: typer.Context, **values: Any) -> int:
+            # Options are in the order in which they were typed.
+            typed_first = [*context.params]
+            in_order = sorted(taken, key=lambda option: typed_first.index(option.argument))
+            read = {o.setting: o.value(values.pop(o.argument, None)) for o in in_order}
             typed = {setting: value for setting, value in read.items() if value is not None}
             return command(*args, options=typed, **values)
 
@@ -290,7 +293,9 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
         parameters = [p for p in signature.parameters.values() if p.name != "options"]
         arguments = [p for p in parameters if p.kind is not p.KEYWORD_ONLY]
         others = [p for p in parameters if p.kind is p.KEYWORD_ONLY]
-        parameters = [*arguments, *(option.parameter() for option in taken), *others]
+        kind = inspect.Parameter.KEYWORD_ONLY
+        context = inspect.Parameter("context", kind, annotation=typer.Context)
+        parameters = [*arguments, *(option.parameter() for option in taken), *others, context]
         run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in parameters}
         return run

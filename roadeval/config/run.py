@@ -56,6 +56,7 @@ from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording.layout import RecordRule
+from roadeval.results.facts import focus_of
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import likely, visible, visible_lines
@@ -139,6 +140,20 @@ class RunConfig(LogConfig):
         trained = [name for name, masks in self.masks.items() if masks.decide == TRAINED]
         variants = (*variants_of(self.pipeline, self.extra), *map(thresholded_variant, trained))
         return tuple(v for v in variants if not self.only or v.name in self.only)
+
+    def names(self) -> list[str]:
+        """Name every variant that runs: those that are computed, then masks of other methods."""
+        topics = (self.topics.masks, *(camera.masks for camera in self.cameras))
+        masks = [name for named in (*topics, self.masks) for name in named]
+        names = dict.fromkeys([*(variant.name for variant in self.variants()), *masks])
+        return [name for name in names if not self.only or name in self.only]
+
+    def check_focus(self, names: Iterable[str]) -> None:
+        """Raise a `ConfigError` if the chosen focus is none of these variants."""
+        try:
+            focus_of(names, self.output.focus)
+        except RoadevalError as error:
+            raise ConfigError.of(error) from error
 
     def by_camera(self) -> dict[str, RunConfig]:
         """Return each camera's configuration by its name; a single camera has the name ``""``."""

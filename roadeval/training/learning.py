@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Role, Truth
+from roadeval.data.words import listing
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score.frame import BlindPrior
 from roadeval.logs.frames import LoggedFrame
@@ -254,7 +255,7 @@ def from_log(
     if not learning:
         return fit((), pipelines, settings), Schedule(picks=picks)
     if not settings.frames:
-        problem = f"is 0, and {', '.join(learning)} must learn"
+        problem = f"must be at least 1, because {listing(learning)} must learn"
         raise TrainingError(problem, setting="training.frames", remedy=WITHOUT_TRAINING)
     held, schedule = HeldFrames(on_frame), Schedule()
     if labelled and picks:

@@ -46,6 +46,11 @@ def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
     assert shown.err.count("\n") == 1
 
 
+def test_a_width_without_a_unit_is_wrong_usage(capsys):
+    assert main(["report", "a.rrd", "--figures", "f", "--width", "8.5"]) == 2
+    assert "8.5 is no width of a figure; write it as 8.5cm" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "meant"),
     [

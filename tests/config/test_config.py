@@ -209,6 +209,7 @@ OTHER = {
     "output.reports": "tables",
     "output.mcap": "masks.mcap",
     "output.record": "worst:7",
+    "output.focus": "unfiltered",
     "preset": "gated",
     "variants": {"wide": {"preset": "printed", "shadow": {"ring_width": 3}}},
     "cameras": [{"image": "/left/image", "name": "left", "masks": {"net": "/net"}}],

@@ -12,6 +12,8 @@ from roadeval.networks import NetSettings, Network, NetworkError
 from tests.networks.making import IMAGE as MADE
 from tests.networks.making import ROAD, SIZE, balanced, network, scores, without_end, written
 
+pytestmark = pytest.mark.usefixtures("opened_here_alone")
+
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
 """An image of the input's size."""
 FRAME = cv2.resize(IMAGE, (48, 30), interpolation=cv2.INTER_CUBIC)

@@ -6,6 +6,7 @@ import pytest
 
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
+from roadeval.evaluation.comparison.compare import RegionChange
 from roadeval.evaluation.comparison.conditions import Condition
 from roadeval.results import comparison
 from roadeval.results.comparison import (
@@ -46,6 +47,19 @@ def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
     moved = replace(rows[1], difference={**rows[1].difference, "FPR": WORSE})
     text = comparison.verdict(a_comparison(rows[0], moved))
     assert "net of new is exactly as good as base" in text
+
+
+@pytest.mark.parametrize(
+    ("row", "why"),
+    [
+        (a_difference(8, 0.1, 17, p_holm=0.4, comparisons=9), "as 9 regions are compared"),
+        (a_difference(8, -1, 17, p=0.1, p_holm=0.4, comparisons=9), "each change may be chance"),
+        (a_difference(8), "no interval, as 12 frames are too few for an interval"),
+    ],
+)
+def test_why_no_region_is_sure_is_told(row, why):
+    part = RegionChange("new", "net", "lit", "in light", 12, 0.1, 0.2, row)
+    assert why in comparison.where(a_comparison(a_change(WORSE, "net"), regions=(part,)))[0]
 
 
 def test_changed_settings_are_told_of_each_result_and_some_of_many():

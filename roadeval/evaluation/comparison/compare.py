@@ -212,8 +212,10 @@ def variants_as_sides(
     if len(names) < 2:
         lone = f"{names[0]} alone" if names else "no variant"
         raise ComparisonError(
-            f"{result.label}: {lone} cannot be compared; name two of its variants with --variant "
-            f"({', '.join(variants) or 'it has none'}), or a second result"
+            f"{lone} cannot be compared",
+            where=result.label,
+            remedy="name two of its variants with --variant "
+            f"({', '.join(variants) or 'it has none'}), or a second result",
         )
     return [replace(result, label=name, variants={name: name}) for name in names]
 
@@ -229,7 +231,9 @@ def compare(
     """
     for side in sides:
         if not side.scored:
-            raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
+            raise ComparisonError(
+                "nothing was scored, so nothing can be compared", where=side.label
+            )
     base, *others = sides
     parts = []
     for new in others:

@@ -20,9 +20,9 @@ from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.logs.truth.drawn import Proposal
 from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, Picked, Picks, Why, digest_of
+from roadeval.logs.truth.shapes import Proposal
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
