@@ -69,7 +69,7 @@ WORST: Final = 50
 """Number of frames in the table of the worst."""
 OF_A_DRIVE: Final = 3
 """Frames of a drive that are among its worst, at most."""
-APART_NS: Final = 1_000_000_000
+APART_NS: Final = 3_000_000_000
 """Neighbours fail alike: of frames less than this apart only the worst counts."""
 CACHED: Final = ("frames", "regions", "scores", "worst")
 """Tables of each drive that are cached in folders of these names; ``regions`` of final masks."""
