@@ -64,7 +64,7 @@ def plots(findings: FleetFolder) -> Iterator[Block]:
         plot = [forest(rows, effect.rates[TESTED], label)] if len(rows) else []
         yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
     blocks = [drives_table(findings, NAMED), note("units")]
-    focus = focus_of(findings.finals)
+    focus = findings.facts.focus
     yield Details(f"Drives with the highest error rate of {focus}", blocks)
 
 
