@@ -22,20 +22,22 @@ class OutputSettings:
     """Where the results of a run are written, and which images are recorded.
 
     save: File of the recording. Default: ``recordings/<drive>.rrd``.
-    reports: Folder of tables and figures. Default: ``reports/<drive>/``, or, with ``--save
-        new.rrd``, ``reports/new/``.
+    reports: Folder of tables and figures. Default: ``reports/<recording>/``.
     mcap: Log of masks, error maps and rates, to open beside the drive. Default: none.
     record: Pictures to record: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``. ``masks``
         also records labels and the camera's image. ``worst:K`` records all pictures of the K frames
         with the highest ERR, in a log without truth with the most uncertain masks; ``every:N``
         those of every N-th frame. ``none`` makes no recording.
+    focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
+        that you bring, else ``filtered``.
     figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
     """
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
-    reports: Annotated[str | None, Flag("-o --reports", "DIR")] = None
+    reports: Annotated[str | None, Flag("-o --output --reports", "DIR")] = None
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
     record: Annotated[str, Flag("--record", "WHAT")] = "all"
+    focus: Annotated[str | None, Flag("--focus", "NAME", "Methods")] = None
     figures: bool = True
 
 

@@ -134,7 +134,7 @@ class LabelSettings:
     All others are non-road. By default a mask has 0, 255 for road and 128 for ignore; or 0, 1 for
     road and 255 for ignore. Negative values mean no label: they are ignored, unless they are named.
 
-    road: Truth values that mean road (in an image with a palette its indices), or names of classes.
+    road: Truth values (of a palette: its indices), or names of classes, that mean road.
     ignore: Truth values, or names of classes, that are not counted.
     road_colors: Truth colours that mean road, as red, green and blue.
     ignore_colors: Truth colours that are not counted.
@@ -168,9 +168,9 @@ class LabelSettings:
 class LabelPlace:
     """Road truth that lies beside the log, and how it is paired with the log's frames.
 
-    path: A folder of label images or NPY files, one a frame; files of an annotation tool (COCO,
-        CVAT, LabelMe, YOLO, Label Studio, Cityscapes, BDD100K, VIA); or LOG.mcap:/topic. In the
-        path ``{drive}`` is the name of the drive's file without its ending.
+    path: Folder of labels, one a frame (images, NPY); COCO, CVAT, LabelMe, YOLO, Label Studio,
+        Cityscapes, BDD100K, VIA; or LOG.mcap:/topic. In the path ``{drive}`` is the name of the
+        drive's file without its ending.
     pair: The pairing of labels with frames: by ``number``, by which the labels' names differ, or by
         ``stamp``, if each name is a time (seconds, or milli-, micro- or nanoseconds since 1970).
         Default: stamps for a log, and for files if all names are times of more than ten digits.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import re
 import subprocess
@@ -123,11 +124,17 @@ class OnnxFile:
         """Return an error about the file."""
         return NetworkError(problem, where=self.path, remedy=remedy)
 
-    def question(self, problem: str, remedy: str = "") -> NetworkError:
-        """Return an error that asks for a missing setting, and lists inputs and outputs."""
+    def question(self, problem: str, remedy: str = "", line: str = "") -> NetworkError:
+        """Return an error that asks for a missing setting, and lists inputs and outputs.
+
+        ``line`` is one of a TOML file that might answer.
+        """
         inputs = first_of([*map(str, self.inputs)], _SHOWN)
         outputs = first_of([*map(str, self.outputs)], _SHOWN)
         listed = f" (inputs: {inputs}; outputs: {outputs})"
+        if line:
+            file = f"`file = {json.dumps(str(self.path))}` and `{line}`"
+            remedy = Sentence("{}, with lines such as {}", remedy, file)
         if remedy:
             return self.error(problem, Sentence("{}{}", remedy, listed))
         return self.error(f"{problem}{listed}")

@@ -55,6 +55,8 @@ CELL: Final = 0.16
 """Side of a cell of the ground seen from above, in metres."""
 NOTES: Final = "/notes"
 GUIDE: Final = "/results/guide"
+FRAME_RATES: Final = "/results/frame"
+"""Below this path lie each variant's rates of a frame, in percent, as a text for the viewer."""
 LAYOUT: Final = "/results/layout"
 SHOWN: Final = "/results/images"
 """The frames that have images, with their header stamps."""
@@ -114,6 +116,8 @@ class Layout:
     has_truth: bool = True
     """Whether any frame has truth of the road."""
     has_shadow_truth: bool = False
+    focus: str = ""
+    """The variant whose errors, or doubts, rank the frames; all of them if it is empty."""
     first_frame: int | None = None
     """The first frame that can be evaluated, if known."""
     rate_hz: float | None = None

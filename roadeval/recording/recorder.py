@@ -23,7 +23,6 @@ from typing import Any, Final, NamedTuple, Self
 import rerun as rr
 
 from roadeval.data import (
-    BASELINE,
     ERRORS,
     FINAL_STAGE,
     IGNORE,
@@ -33,8 +32,8 @@ from roadeval.data import (
     LayerKind,
 )
 from roadeval.data.arrays import IGNORED
-from roadeval.data.words import short_names
-from roadeval.evaluation.metrics import TESTED
+from roadeval.data.words import percent, short_names
+from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.geometry.plan import Plan
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
@@ -60,6 +59,8 @@ class EncodedFrame(NamedTuple):
     """All states, empty where undefined."""
     notes: tuple[tuple[str, str], ...]
     """Sentences with their levels."""
+    texts: Mapping[str, str]
+    """Rates in words."""
     error: float
     """The value that ranks frames, see `worst_error`."""
 
@@ -137,17 +138,29 @@ def _numbers(
                 yield f"/facts/{mask}/{name}", (value,)
 
 
-def worst_error(result: FrameResult, layout: Layout) -> float:
-    """Return the greatest error rate of any variant's final mask; -1 for a frame not evaluated.
+def _rates_in_words(result: FrameResult, layout: Layout) -> Iterator[tuple[str, str]]:
+    """Yield the rates of each variant's final mask by entity path."""
+    finals = {(variant.name, variant.stages[-1]): variant.name for variant in layout.variants}
+    rates = {name: "not scored" for name in finals.values() if layout.has_truth}
+    for tally in result.tallies:
+        if name := finals.get((tally.variant, tally.stage)):
+            lines = (f"{rate} {percent(tally.rates[rate])} %" for rate in SHORT)
+            rates[name] = "\n".join(lines)
+    for name, text in rates.items():
+        yield f"{at.FRAME_RATES}/{name}", f"This frame:\n{text}"
 
-    Without truth it is the doubt in the first variant's mask.
+
+def worst_error(result: FrameResult, layout: Layout) -> float:
+    """Return the error rate of the focus's final mask; -1 for a frame not evaluated.
+
+    Without truth it is the doubt in that mask.
     """
+    names = [layout.focus] if layout.focus else [variant.name for variant in layout.variants]
     if not layout.has_truth:
-        signs = [
-            sign for doubt in result.doubts[:1] for sign in (doubt.entropy, doubt.disagreement)
-        ]
+        doubts = [doubt for doubt in result.doubts if doubt.variant in names]
+        signs = [sign for doubt in doubts[:1] for sign in (doubt.entropy, doubt.disagreement)]
         return next((sign for sign in signs if not math.isnan(sign)), -1.0)
-    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
+    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant in names)
     return max((t.rates[TESTED] for t in finals), default=-1.0)
 
 
@@ -168,7 +181,7 @@ class WorstFrames:
 
     def offer(self, encoded: EncodedFrame) -> None:
         """Keep a frame's images if it is among the worst; among equal frames the earlier ones."""
-        bare = encoded._replace(numbers={}, states={}, notes=())
+        bare = encoded._replace(numbers={}, states={}, notes=(), texts={})
         heapq.heappush(self._heap, (encoded.error, -encoded.when[0], encoded.camera, bare))
         self._bytes += bare.size
         while len(self._heap) > self._most or self._bytes > HELD:
@@ -325,6 +338,7 @@ class Recorder:
             {camera.prefix + path: values for path, values in numbers},
             {camera.prefix + path: state for path, state in states.items()},
             tuple((note, level) for note in result.notes),
+            {camera.prefix + path: text for path, text in _rates_in_words(result, camera.layout)},
             error,
         )
 
@@ -349,6 +363,8 @@ class Recorder:
             self._rows[below + f"/results/{name}", columns.texts].add(when, text)
         for path, numbers in encoded.numbers.items():
             self._numbers[path, columns.numbers].add(when, numbers)
+        for path, text in encoded.texts.items():
+            self._numbers[path, columns.texts].add(when, text)
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
         if put_aside:

@@ -39,7 +39,9 @@ class TrainingError(RoadevalError):
     """Frames from which nothing can be learnt."""
 
 
-WITHOUT_TRAINING: Final = Sentence("give {training.model}, or run what learns nothing with {only}")
+WITHOUT_TRAINING: Final = Sentence(
+    "give {training.model}, or score only masks or networks with {only}"
+)
 
 
 def fit(
@@ -347,9 +349,10 @@ def choose_frames(
     beside = frozenset(number for place, number in enumerate(numbers) if place in near)
     left = [number for number in numbers if number not in beside | trained | lost.keys()]
     if with_truth and trained and not left:
+        used = f" ({len(trained)}) or left out as its gap ({len(beside)})" if beside else ""
         raise TrainingError(
-            f"the range has {len(numbers)} labelled frames, and training would take {len(trained)} "
-            f"of them and {len(beside)} more as a gap: none is left to evaluate",
+            f"all {len(numbers)} labelled frames in the range are used for training{used}, so none "
+            "is left to score",
             remedy=Sentence(
                 "set {training.frames} to {}, {}",
                 max(len(numbers) // (2 + 2 * gap), 1),

@@ -41,8 +41,8 @@ def test_the_drives_that_are_worse_are_found_and_no_others(compared):
     changed = {(row.variant, row.drive) for row in found.drives if row.changed}
     assert changed == {("filtered", f"drive_000{place}") for place in (0, 3, 6)}
     assert found.warnings == (
-        "base: 1 of 10 drives failed, no number counts drive_0007",
-        "new: 1 of 10 drives failed, no number counts drive_0007",
+        "base: 1 of 10 drives failed and is in no number: drive_0007",
+        "new: 1 of 10 drives failed and is in no number: drive_0007",
         "2 drives are left out of base (not scored in both): drive_0007, drive_0009",
     )
     assert compared.sides == ()

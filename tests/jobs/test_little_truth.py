@@ -85,7 +85,7 @@ def test_six_labels_that_must_train_are_refused_with_what_would_do(places, tmp_p
     with pytest.raises(TrainingError) as caught:
         replay(places, tmp_path, "6")
     said = str(caught.value)
-    assert "the range has 6 labelled frames, and training would take 6 of them" in said
+    assert "all 6 labelled frames in the range are used for training, so none is left" in said
     assert all(each in said for each in ("`training.frames` to 3", "`training.model`", "`only`"))
     done = replay(places, tmp_path, "6", training={"frames": 3})
     assert (done.summary["frames"]["trained_on"], done.summary["frames"]["evaluated"]) == (3, 3)

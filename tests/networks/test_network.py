@@ -228,7 +228,11 @@ def test_another_file_than_the_stated_one_is_refused(tmp_path):
 
 ASKED = {
     "a size that it does not take": ({}, {"size": (20, 20)}, "takes no input of 20x20"),
-    "which of several outputs": ({"spare": True}, {}, "`net.outputs`"),
+    "which of several outputs": (
+        {"spare": True},
+        {},
+        "name those that show road by `net.outputs`, with lines such as `file = ",
+    ),
     "an output that is not there": ({}, {"outputs": ("seg",)}, "has no output 'seg'"),
     "which of three classes": (
         {"classes": 3},

@@ -58,6 +58,7 @@ from roadeval.evaluation.tables import (
     values_of,
 )
 from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.text import likely
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -206,9 +207,8 @@ def variants_as_sides(
     names = list(chosen or pipelines)
     for name in names:
         if name not in variants:
-            raise ComparisonError(
-                f"no variant {name}", where=result.label, remedy=f"there are {', '.join(variants)}"
-            )
+            choice = f"{likely(name, variants)}there are {', '.join(variants)}"
+            raise ComparisonError(f"no variant {name}", where=result.label, remedy=choice)
     if len(names) < 2:
         lone = f"{names[0]} alone" if names else "no variant"
         raise ComparisonError(
