@@ -109,6 +109,7 @@ def configuration(options: OptionValues) -> RunConfig:
         config = config.with_tuned(options.get("tunes", ()))
         if "only" in options:
             config = config.override({"only": options["only"]})
+    config = _first_brought(config, options)
     if path := options.get("ground"):
         ground = read_camera(path, config.topics.image)
         with in_file(str(path)):
@@ -120,6 +121,21 @@ def configuration(options: OptionValues) -> RunConfig:
             f"({config.training.model})"
         )
     return config
+
+
+def _first_brought(config: RunConfig, options: OptionValues) -> RunConfig:
+    """Return the configuration with the first variant that was typed as its focus.
+
+    It has no other by itself: by default computed variants come before masks of other methods.
+    """
+    from roadeval.results.facts import focus_of
+
+    methods = ("variants", "nets", "topics.masks", "masks")
+    names = config.names()
+    typed = [name for o in options if o in methods for name, _ in options[o] if name in names]
+    if config.output.focus or focus_of(names) not in typed[1:]:
+        return config
+    return config.override({"output": {"focus": typed[0]}})
 
 
 def _variant(name: str, path: str | None) -> Variant:
@@ -148,6 +164,12 @@ def _mask_tables(name: str, path: str) -> dict[str, Any]:
 
 
 Camera = Annotated[str | None, option("--camera", "One of several cameras.", "NAME")]
+
+
+Focus = Annotated[
+    str | None,
+    option("--focus", "Variant to speak of. Default: what you brought, else filtered.", "NAME"),
+]
 
 
 def select_camera(result: Result_, name: str | None) -> Result_:

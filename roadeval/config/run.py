@@ -56,9 +56,10 @@ from roadeval.logs.settings import CameraSettings, LabelSettings, LogConfig
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording.layout import RecordRule
+from roadeval.results.facts import focus_of
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import meanings
-from roadeval.runtime.text import visible, visible_lines
+from roadeval.runtime.text import likely, visible, visible_lines
 from roadeval.training.settings import TrainingSettings
 
 OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks", "ground")
@@ -100,7 +101,7 @@ class RunConfig(LogConfig):
                 raise ConfigError(
                     f"there is no variant {name}",
                     setting="only",
-                    remedy=f"choose {list_names(names)}",
+                    remedy=f"{likely(name, names)}choose {list_names(names)}",
                 )
         self._check_cameras()
         try:
@@ -139,6 +140,20 @@ class RunConfig(LogConfig):
         trained = [name for name, masks in self.masks.items() if masks.decide == TRAINED]
         variants = (*variants_of(self.pipeline, self.extra), *map(thresholded_variant, trained))
         return tuple(v for v in variants if not self.only or v.name in self.only)
+
+    def names(self) -> list[str]:
+        """Name every variant that runs: those that are computed, then masks of other methods."""
+        topics = (self.topics.masks, *(camera.masks for camera in self.cameras))
+        masks = [name for named in (*topics, self.masks) for name in named]
+        names = dict.fromkeys([*(variant.name for variant in self.variants()), *masks])
+        return [name for name in names if not self.only or name in self.only]
+
+    def check_focus(self, names: Iterable[str]) -> None:
+        """Raise a `ConfigError` if the chosen focus is none of these variants."""
+        try:
+            focus_of(names, self.output.focus)
+        except RoadevalError as error:
+            raise ConfigError.of(error) from error
 
     def by_camera(self) -> dict[str, RunConfig]:
         """Return each camera's configuration by its name; a single camera has the name ``""``."""
@@ -236,7 +251,8 @@ class RunConfig(LogConfig):
         variants = []
         for name in names:
             if name not in pipelines and name not in masks:
-                remedy = f"choose {list_names({*pipelines, *masks} - {FILTERED, UNFILTERED})}"
+                methods = {*pipelines, *masks} - {FILTERED, UNFILTERED}
+                remedy = f"{likely(name, methods)}choose {list_names(methods)}"
                 raise ConfigError(f"there is no method {name}", setting="tunes", remedy=remedy)
             variants.append(tuned_variant(name, pipelines.get(name)))
         return self.with_variants(variants)

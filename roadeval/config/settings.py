@@ -23,9 +23,8 @@ class OutputSettings:
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
     """File of the recording. Default: ``recordings/<drive>.rrd``."""
-    reports: Annotated[str | None, Flag("-o --reports", "DIR")] = None
-    """Folder of tables and figures. Default: ``reports/<drive>/``, or, with ``--save new.rrd``,
-    ``reports/new/``."""
+    reports: Annotated[str | None, Flag("-o --output --reports", "DIR")] = None
+    """Folder of tables and figures. Default: ``reports/<recording>/``."""
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
     """Log of masks, error maps and rates, to open beside the drive. Default: none."""
     record: Annotated[str, Flag("--record", "WHAT")] = "all"
@@ -33,6 +32,9 @@ class OutputSettings:
     records labels and the camera's image. ``worst:K`` records all pictures of the K frames with
     the highest ERR, in a log without truth with the most uncertain masks; ``every:N`` those of
     every N-th frame. ``none`` makes no recording."""
+    focus: Annotated[str | None, Flag("--focus", "NAME", "Methods")] = None
+    """Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
+    that you bring, else ``filtered``."""
     figures: bool = True
     """Whether the paper's figures are drawn; a fleet does not draw those of its drives."""
 

@@ -116,6 +116,8 @@ class Layout:
     has_truth: bool = True
     """Whether any frame has truth of the road."""
     has_shadow_truth: bool = False
+    focus: str = ""
+    """The variant whose errors, or doubts, rank the frames; all of them if it is empty."""
     first_frame: int | None = None
     """The first frame that can be evaluated, if known."""
     rate_hz: float | None = None

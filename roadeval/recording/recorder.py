@@ -23,7 +23,6 @@ from typing import Any, Final, NamedTuple, Self
 import rerun as rr
 
 from roadeval.data import (
-    BASELINE,
     ERRORS,
     FINAL_STAGE,
     IGNORE,
@@ -152,16 +151,16 @@ def _rates_in_words(result: FrameResult, layout: Layout) -> Iterator[tuple[str, 
 
 
 def worst_error(result: FrameResult, layout: Layout) -> float:
-    """Return the greatest error rate of any variant's final mask; -1 for a frame not evaluated.
+    """Return the error rate of the focus's final mask; -1 for a frame not evaluated.
 
-    Without truth it is the doubt in the first variant's mask.
+    Without truth it is the doubt in that mask.
     """
+    names = [layout.focus] if layout.focus else [variant.name for variant in layout.variants]
     if not layout.has_truth:
-        signs = [
-            sign for doubt in result.doubts[:1] for sign in (doubt.entropy, doubt.disagreement)
-        ]
+        doubts = [doubt for doubt in result.doubts if doubt.variant in names]
+        signs = [sign for doubt in doubts[:1] for sign in (doubt.entropy, doubt.disagreement)]
         return next((sign for sign in signs if not math.isnan(sign)), -1.0)
-    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
+    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant in names)
     return max((t.rates[TESTED] for t in finals), default=-1.0)
 
 
@@ -456,8 +455,8 @@ class Recorder:
         """Raise a `RecordingError`, caused by an ENOSPC, if the disk is full or nearly full."""
         if self._room() < self._rows.size:
             raise RecordingError(
-                f"{self.path}: cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must "
-                "stay free)"
+                f"cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must stay free)",
+                where=self.path,
             ) from _failure(errno.ENOSPC)
 
     def _room(self) -> float:
@@ -563,7 +562,9 @@ class Recorder:
 
     def _incomplete(self) -> RecordingError:
         refusal = self._refusal() or _failure(errno.EIO)
-        error = RecordingError(f"{self.path}: cannot be written any further: {refusal.strerror}")
+        error = RecordingError(
+            f"cannot be written any further: {refusal.strerror}", where=self.path
+        )
         error.__cause__ = refusal
         return error
 

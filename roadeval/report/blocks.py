@@ -154,6 +154,8 @@ class Table(Block):
     """The text above the table."""
     small: bool = False
     """Whether it is set in small type."""
+    name: str = ""
+    """A name by which the script of a page finds it."""
     find: str = ""
     """The label of a field on a page that searches words in a table of many rows."""
 

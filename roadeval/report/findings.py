@@ -23,7 +23,6 @@ from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, Totals
 from roadeval.results.tables import read_table
-from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +38,7 @@ class NotableFrame:
     frame: int
     stamp_ns: int
     variant: str
-    """The variant that fails or changes; empty in a row of a table, and without truth."""
+    """The variant that fails or changes, in a row of a table the focus."""
     rates: Mapping[str, Mapping[str, float]]
     """Rates of each variant's final mask, as in short tables; without truth its signs of doubt."""
     parts: Mapping[str, float] = field(default_factory=dict)
@@ -57,8 +56,8 @@ class NotableFrame:
 
     @property
     def error(self) -> float:
-        """The ERR of the focus, or its first sign of doubt; -1 if none is defined."""
-        rates = self.rates.get(focus_of(self.rates) or "", {})
+        """Its ERR, or its first sign of doubt; -1 if none is defined."""
+        rates = self.rates.get(self.variant, {})
         return next((rates[by] for by in (TESTED, *SIGNS) if defined(rates.get(by))), -1.0)
 
 

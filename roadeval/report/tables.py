@@ -65,6 +65,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         ["final mask", *columns],
         [[variant_cell(name, names), *row] for name, row in zip(names, rows, strict=True)],
         small=not of_fleet,
+        name="rates",
         caption=" ".join(sentences),
     )
 

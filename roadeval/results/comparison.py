@@ -150,20 +150,20 @@ def changed_drives(comparison: Comparison) -> list[str]:
 
 
 def describe_judgement(judgement: Judgement) -> str:
-    """Return a sentence on the value that a condition limits, and whether it holds."""
+    """Return a sentence on the value that a condition limits."""
     condition, drives = judgement.condition, judgement.drives
     if judgement.holds is None:
         return judgement.why
     rate = f"{condition.stage}.{condition.variant}.{condition.rate} of {judgement.result}"
-    holds = "holds" if judgement.holds else "does not hold"
+    limit = f"(limit: {condition.text})"
     after, over = f"{percent(judgement.after)} %", f" over {drives} drives" if drives > 1 else ""
     if not condition.is_change:
-        return f"{rate} is {after}{over}: {condition.text} {holds}"
-    change = f"{plain_points(judgement.value)} pp"
+        return f"{rate} is {after}{over} {limit}"
+    change = f"{plain_points(judgement.value)} points"
     if condition.surely:
         change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
     before = f"{percent(judgement.before)} %"
-    return f"{rate} changed by {change}{over} ({before} to {after}): {condition.text} {holds}"
+    return f"{rate} changed by {change}{over}, from {before} to {after} {limit}"
 
 
 def headline(holds: Sequence[bool | None]) -> str:

@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
+from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
@@ -18,6 +19,8 @@ from typing import Any, ClassVar, Final, Self
 from pydantic import TypeAdapter, ValidationError
 
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
+from roadeval.data.words import listing
+from roadeval.errors import RoadevalError
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference
@@ -31,6 +34,27 @@ from roadeval.runtime.text import elide, visible, visible_lines
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; it is written last."""
+
+
+def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
+    """Return the variant that a result is about: the chosen one, else the first that was brought.
+
+    If none was brought, it is the first; None without any. A `RoadevalError` if the chosen one is
+    not there.
+
+    >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
+    'mine'
+    >>> focus_of(["filtered", "unfiltered", "mine"], "unfiltered")
+    'unfiltered'
+    """
+    names = [name for name in variants if name != BASELINE]
+    if chosen and chosen not in names:
+        there = f"there {'are' if len(names) > 1 else 'is'} {listing(names) or 'none'}"
+        likely = get_close_matches(chosen, names, 1)
+        remedy = f"did you mean {likely[0]}? {there.capitalize()}" if likely else there
+        raise RoadevalError(f"there is no variant {chosen}", setting="output.focus", remedy=remedy)
+    brought = [name for name in names if name not in (FILTERED, UNFILTERED)]
+    return chosen or next(iter([*brought, *names]), None)
 
 
 Totals = dict[str, dict[str, dict[str, Any]]]
@@ -141,12 +165,20 @@ class FactsFile:
     """Greatest number of values that are read."""
     totals: Totals
     effects: list[Effect]
+    misfits: list[str]
     run: dict[str, Any]
 
     @cached_property
     def finals(self) -> dict[str, str]:
         """Each scored variant's final stage."""
         return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
+
+    @property
+    def focus(self) -> str | None:
+        """The scored variant that the result is about; None if nothing was scored."""
+        output = self.run.get("output")
+        chosen = output.get("focus") if isinstance(output, Mapping) else None
+        return focus_of(self.finals, chosen if chosen in [*self.finals] else None)
 
     @property
     def final_effects(self) -> list[Effect]:
@@ -396,10 +428,15 @@ class FleetFacts(FactsFile):
     warnings: list[str]
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
+    misfits: list[str] = field(default_factory=list)
+    """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
-    RESULTS = ("verdict", "counts", "frames", "totals", "effects", "strata", "warnings")
+    RESULTS = (
+        *("verdict", "counts", "frames", "totals", "effects", "strata", "warnings", "misfits"),
+    )
+    OPTIONAL = ("misfits",)
 
 
 def is_fleet(path: str | Path) -> bool:

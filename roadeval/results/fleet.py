@@ -27,7 +27,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import concatenate, is_final, only, values_of
+from roadeval.evaluation.tables import concatenate, group_rows, is_final, only, values_of
 from roadeval.results.facts import (
     FLEET,
     SUMMARY,
@@ -51,7 +51,7 @@ from roadeval.results.tables import (
     read_table,
     write_parquet,
 )
-from roadeval.results.verdict import focus_of
+from roadeval.results.verdict import with_focus
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_output, claim_files, leads_outside, put, sha256_of, writing
 from roadeval.runtime.text import is_utf8, visible
@@ -67,6 +67,10 @@ PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
 """Number of frames in the table of the worst."""
+OF_A_DRIVE: Final = 3
+"""Frames of a drive that are among its worst, at most."""
+APART_NS: Final = 1_000_000_000
+"""Neighbours fail alike: of frames less than this apart only the worst counts."""
 CACHED: Final = ("frames", "regions", "scores", "worst")
 """Tables of each drive that are cached in folders of these names; ``regions`` of final masks."""
 
@@ -149,13 +153,15 @@ def read_made(folder: Path, drive: str) -> Made | None:
 class FleetFolder:
     """Reads a fleet's folder, which may come from another machine and from anybody.
 
-    Nothing outside it is read or written, wherever its links and tables lead. A `ResultsError` if
+    Nothing outside it is read or written, wherever its links and tables lead. It is about ``focus``
+    if it has that variant, or else about what it was made about. A `ResultsError` if
     it is no fleet's folder, or one of another version.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, focus: str | None = None) -> None:
         self.path = folder
-        self.facts = FleetFacts.read(folder / FLEET)
+        facts = FleetFacts.read(folder / FLEET)
+        self.facts = with_focus(facts, focus) if focus else facts
         if not all(is_plain(member.drive) for member in self.facts.drives):
             raise ResultsError(
                 f"{folder / FLEET}: damaged (a drive's name is not made of letters, digits, '-' "
@@ -224,7 +230,7 @@ class FleetFolder:
     @cached_property
     def focus_scores(self) -> pd.DataFrame:
         """The rows of ``scores`` of the focus's final mask, on all pixels, by drive."""
-        scores = only(self.scores, final=True, region=ALL, variant=focus_of(self.finals))
+        scores = only(self.scores, final=True, region=ALL, variant=self.facts.focus)
         return scores.set_index("drive", drop=False)
 
     @cached_property
@@ -235,8 +241,20 @@ class FleetFolder:
 
     @cached_property
     def worst(self) -> pd.DataFrame:
-        """The rows of ``worst``: the worst frames over all drives."""
-        return self.table("worst")
+        """The rows of ``worst``: the worst frames of the focus over all drives.
+
+        Those of another focus than the one of the replay have no pictures.
+        """
+        rows, focus = self.table("worst"), self.facts.focus
+        if focus is None or focus in values_of(rows, "variant"):
+            return rows
+        frames = tables.finals(only(self.table("frames"), variant=focus))
+        frames = frames.assign(rank=0, picture="")[[*rows]]
+        parts = [
+            tables.worst(of_drive, OF_A_DRIVE, apart_ns=APART_NS)
+            for _, of_drive in group_rows(frames, ["drive"])
+        ]
+        return rank_worst(concatenate([frames[:0], *parts]))
 
     def picture(self, frame: Mapping[str, Any]) -> bytes | None:
         """Return the JPEG of a row of ``worst``; None if it lies elsewhere, or is cut off."""
@@ -258,6 +276,14 @@ class FleetFolder:
         """Height of the frames in pixels; 0 if drives differ."""
         heights = self.drives["height"][self.drives["evaluated"].fillna(0) > 0].dropna().unique()
         return int(heights[0]) if len(heights) == 1 else 0
+
+
+def rank_worst(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of ``worst`` with the highest ERR over all drives, with their ranks."""
+    order = {TESTED: False, "drive": True, "frame": True}
+    words = rows.astype({"drive": "str"})
+    ranked = words.sort_values([*order], ascending=[*order.values()]).head(WORST)
+    return ranked.assign(rank=np.arange(1, len(ranked) + 1))
 
 
 def of_drive(results: ResultsFolder, name: str, drive: str) -> pd.DataFrame:
@@ -283,14 +309,15 @@ def cache(folder: Path, drive: str) -> None:
         "frames": frames,
         "regions": tables.finals(regions),
         "scores": scores(frames, regions, beyond_masks(results.facts, key)),
-        "worst": _frames_with_pictures(folder, drive, frames).assign(rank=0),
+        "worst": _frames_with_pictures(
+            folder, drive, only(frames, final=True, variant=results.facts.focus)
+        ).assign(rank=0),
     }
     write_parquet({files[name]: (name, rows[name]) for name in CACHED}, summary)
 
 
-def _frames_with_pictures(folder: Path, drive: str, frames: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of ``worst``: the frames of a drive that have pictures."""
-    rows = frames[frames["final"] & (frames["variant"] == focus_of(values_of(frames, "variant")))]
+def _frames_with_pictures(folder: Path, drive: str, rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of ``worst``: those of a drive's ``frames`` that have pictures."""
     place = Path(PICTURES, drive)
     stems = [path.stem for path in check_inside(folder / place, folder).glob("*.jpg")]
     numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]
@@ -379,10 +406,7 @@ class FleetWriter:
             made = self._read_cache(rows["cached"], again=True)
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
-        words = made["worst"].astype({"drive": "str"})
-        order = {TESTED: False, "drive": True, "frame": True}
-        worst = words.sort_values([*order], ascending=[*order.values()]).head(WORST)
-        made["worst"] = worst.assign(rank=np.arange(1, len(worst) + 1))
+        made["worst"] = rank_worst(made["worst"])
         write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in OF_DRIVES})
         finals = {
             "drives": made["drives"],

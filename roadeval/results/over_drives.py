@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data.words import listing
@@ -16,7 +17,7 @@ from roadeval.evaluation.tables import COUNTS, MASK, group_rows, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
-from roadeval.results.verdict import verdict
+from roadeval.results.verdict import verdict_on
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -61,20 +62,21 @@ def summarise(
             for tag, value, change in strata(only(mask, metric=TESTED), tags, settings.confidence):
                 parts.append(StratumFacts(base, variant, tag.removeprefix(TAG), value, change))
         differences += correct_effects(family)
-    totals = _totals(scores)
-    return FleetFacts(
-        verdict=" ".join([*_misfits(rows), verdict(totals, differences)]),
+    facts = FleetFacts(
+        verdict="",
         version=VERSION,
         drives=[*members],
         counts=dict(Counter(drives["status"])),
         frames=int(drives["evaluated"].sum()),
         failed={row["drive"]: row["reason"] for row in rows if row["status"] == FAILED},
-        totals=totals,
+        totals=_totals(scores),
         effects=differences,
         strata=parts,
         warnings=[*_warnings_of_copies(copies, cameras), *_warnings_of_drives(rows)],
         run=run,
+        misfits=[*_misfits(rows)],
     )
+    return replace(facts, verdict=verdict_on(facts))
 
 
 def _totals(scores: pd.DataFrame) -> Totals:

@@ -7,40 +7,86 @@ one sentence, which never gives an interval of a single drive whose frames count
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import counted, defined, in_percent, listing, number, percent
+from roadeval.data.words import DASH, counted, defined, in_percent, listing, number, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.evaluation.score.unlabelled import sign_of
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference
-from roadeval.evaluation.tables import final_stages
-from roadeval.results.facts import EstimateFacts, UnlabelledFacts
+from roadeval.evaluation.tables import final_stages, only, scene_ns, values_of, worst
+from roadeval.results.facts import EstimateFacts, Facts, FleetFacts, UnlabelledFacts, focus_of
 from roadeval.results.sentences import FINE, ROUNDING, Rates, is_sure
+from roadeval.runtime.sentence import Sentence
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
-BLIND: Final = f"{BASELINE}, which never looks at the image"
+BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
 """Independent frames below which those of one drive say little about other frames."""
 WEAK: Final = 0.02
 """An error rate from which the preset ``robust`` is worth a try."""
 ROBUST: Final = "robust"
+LOOKED_AT: Final = 10
+"""Frames without truth that are worth a look, at most."""
 NAMED: Final = 5
 """Frames without truth that a verdict names."""
 
 
-def focus_of(variants: Iterable[str]) -> str | None:
-    """Return the variant that a result is about: the first that the user brought, else the first.
+def verdict_on(facts: Facts | FleetFacts) -> str:
+    """Return the verdict on a drive or a fleet, after what does not fit there."""
+    more: dict[str, Any] = {"focus": facts.focus}
+    if isinstance(facts, Facts) and not facts.cameras:
+        more |= {"thresholds": facts.thresholds}
+        more |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
+    told = verdict(facts.totals, facts.effects, **more)
+    return Sentence(" ").join([*facts.misfits, told])
 
-    >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
-    'mine'
+
+AnyFacts = TypeVar("AnyFacts", bound=Facts | FleetFacts)
+
+
+def with_focus(facts: AnyFacts, focus: str, doubts: pd.DataFrame | None = None) -> AnyFacts:
+    """Return facts with another focus, and the verdict on it; nothing is replayed for it.
+
+    ``doubts`` are the rows of ``unlabelled``. The facts of a rig's cameras stay as they are.
     """
-    names = [name for name in variants if name != BASELINE]
-    brought = [name for name in names if name not in (FILTERED, UNFILTERED)]
-    return next(iter([*brought, *names]), None)
+    output = {**facts.run.get("output", {}), "focus": focus}
+    changes: dict[str, Any] = {"run": {**facts.run, "output": output}}
+    known = facts.unlabelled if isinstance(facts, Facts) else None
+    if known and doubts is not None and len(rows := only(doubts, variant=focus)):
+        changes["unlabelled"] = describe_doubts(rows, known.differing)
+    facts = replace(facts, **changes)
+    return replace(facts, verdict=verdict_on(facts))
+
+
+def verdicts(facts: Facts | FleetFacts, doubts: pd.DataFrame | None = None) -> dict[str, str]:
+    """Return the verdict with each variant as the focus; for ``doubts`` see `with_focus`."""
+    names = [*facts.finals] or ([] if doubts is None else values_of(doubts, "variant"))
+    return {name: with_focus(facts, name, doubts).verdict for name in names if name != BASELINE}
+
+
+def describe_doubts(
+    rows: pd.DataFrame, differing: Mapping[str, Mapping[str, float]]
+) -> UnlabelledFacts | None:
+    """Return which frames without truth to look at; None without any.
+
+    ``rows`` are those of ``unlabelled`` of one variant; for ``differing`` see `UnlabelledFacts`.
+    """
+    if not len(rows):
+        return None
+    look_at, sign = [], sign_of(rows)
+    if sign is not None:
+        ranked = worst(rows, LOOKED_AT, sign, scene_ns(rows["stamp_ns"]))
+        look_at = ranked["frame"].tolist()
+    shares = {name: {**others} for name, others in differing.items()}
+    return UnlabelledFacts(len(rows), str(rows["variant"].iloc[0]), sign, look_at, shares)
 
 
 def verdict(
@@ -48,27 +94,29 @@ def verdict(
     effects: Sequence[Effect],
     thresholds: Mapping[str, Mapping[str, Any]] | None = None,
     *,
+    focus: str | None = None,
     unlabelled: UnlabelledFacts | None = None,
     estimated: EstimateFacts | None = None,
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
-    They say how wrong it is and how; which variant is best, if it is another; how it compares with
-    the baseline and with the filter's absence; and what to do next. ``totals`` are rates by variant
-    and stage, empty if nothing was scored; ``effects`` are of final masks at least; ``thresholds``
-    are the best ones, as in `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled``
-    tells which frames to look at. ``estimated`` are rates of the whole drive, from frames that were
-    drawn at random.
+    The focus is by default that of `focus_of`. They say how wrong it is and how; how it compares
+    with the baseline and with the filter's absence; which variant is best, if it is another; and
+    what to do next. ``totals`` are rates by variant and stage, empty if nothing was scored;
+    ``effects`` are of final masks at least; ``thresholds`` are the best ones, as in
+    `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells which frames to look
+    at. ``estimated`` are rates of the whole drive, from frames that were drawn at random.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
     stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
-    focus = focus_of(rates)
+    focus = focus_of(rates, focus)
     if best is None or focus is None:
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
+    own = rates[focus][TESTED]
     whole_drive = [*from_labels(estimated, focus)]
     lead = "On these alone: " if whole_drive else ""
     other = f"Best here is {best}: {percent(rates[best][TESTED], 1)} %."
@@ -76,8 +124,8 @@ def verdict(
         [
             *whole_drive,
             f"{lead}{_how_wrong(focus, rates[focus], [*of_focus.values()])}",
-            *([other] if rates[best][TESTED] != rates[focus][TESTED] else []),
             *_compared(focus, of_focus),
+            *([other] if not defined(own) or rates[best][TESTED] < own else []),
             *_next_step(focus, rates, thresholds or {}),
         ]
     )
@@ -144,15 +192,15 @@ def _no_interval(change: Difference) -> str:
 def _points(change: Difference, name: str, *, alone: bool = False) -> str:
     """Return a difference of error rates in points; not ``alone`` with what it is elsewhere.
 
-    >>> _points(Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91), "blind")
-    '2.0 points (1.0 to 3.0 on others) better than blind'
+    >>> _points(Difference(-0.02, -0.05, 0.01, 0.2, 0.95, "frames", 91), "blind")
+    '2.0 points (may be chance) better than blind'
     """
     if change.is_zero:
         return f"exactly as good as {name}"
     doubt, digits = "", 1 if abs(change.mean) >= FINE else 2
     if not alone and change.low is not None and change.high is not None:
         least, most = (_size(end, digits) for end in _ends(change))
-        doubt = f" ({least} to {most} on others)"
+        doubt = f" ({least}{DASH}{most} on others)"
         doubt = doubt if is_sure(change) else " (may be chance)"
     direction = "worse" if change.mean > 0 else "better"
     return f"{_size(change.mean, digits)} points{doubt} {direction} than {name}"
@@ -209,26 +257,22 @@ def _size(fraction: float, digits: int) -> str:
 def _next_step(
     focus: str, rates: Mapping[str, Rates], thresholds: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[str]:
-    """Yield what to do next: set thresholds, or try the preset that is best on real roads.
+    """Yield what to do next: set the threshold, or try the preset that is best on real roads.
 
     A threshold is not told if the error rate would hardly change.
     """
-    steps = []
-    for name, best in thresholds.items():
-        now = rates.get(name, {}).get(f"pooled_{TESTED}", math.nan)
-        if abs(now - best[TESTED]) >= ROUNDING:
-            digits = 1 if abs(now - best[TESTED]) >= FINE else 2
-            lines = "` and `".join(best.get("lines", "").splitlines())
-            steps.append(
-                f"Set {'its threshold' if name == focus else f'the threshold of {name}'} to "
-                f"{best['threshold']:.2g}, not {best['own']:.2g}: then "
-                f"{in_percent(best[TESTED]):.{digits}f} % are wrong"
-                f"{f' (write `{lines}`)' if lines else ''}."
-            )
-    is_weak = focus in (FILTERED, UNFILTERED) and rates[focus][TESTED] >= WEAK
-    if is_weak and not steps and ROBUST not in rates:
-        steps.append("Next: try --variant robust.")
-    yield from steps
+    own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
+    best = thresholds.get(focus)
+    if best and defined(pooled) and abs(pooled - best[TESTED]) >= ROUNDING:
+        digits = 1 if abs(pooled - best[TESTED]) >= FINE else 2
+        lines = "` and `".join(best.get("lines", "").splitlines())
+        yield (
+            f"Set its threshold to {best['threshold']:.2g}, not {best['own']:.2g}: then "
+            f"{in_percent(best[TESTED]):.{digits}f} % are wrong"
+            f"{f' (write `{lines}`)' if lines else ''}."
+        )
+    elif focus in (FILTERED, UNFILTERED) and ROBUST not in rates and defined(own) and own >= WEAK:
+        yield "Next: try --variant robust."
 
 
 def lowest(rates: Mapping[str, Rates]) -> str | None:

@@ -107,7 +107,8 @@ def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
     rows = only(opened.table("unlabelled"), variant="filtered")
     first = int(rows["frame"][rows["disagreement"].argmax()])
     assert inspecting.worst(opened).frame == first
-    assert inspecting.worst(opened, "unfiltered").by == "disagreement"
+    other = inspecting.worst(DriveResult(unlabelled.recording, focus="unfiltered"))
+    assert (other.variant, other.by) == ("unfiltered", "disagreement")
     again = "the first to look at with pictures (--frame N or --worst K takes another)"
     assert told(unlabelled.recording) == f"frame {first}, {again}\n"
 
@@ -117,7 +118,7 @@ def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):
     [
         (["--frame", 123456], 1, "no frame 123456; the recording holds frames 0 to 99"),
         (["--worst", 500], 1, "there is no worst frame number 500: "),
-        (["--worst", 1, "--variant", "net"], 1, "no variant net; there are filtered, unfiltered"),
+        (["--worst", 1, "--variant", "net"], 1, "no variant net; there are filtered"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(words, code, said, demo):
@@ -207,7 +208,7 @@ def test_of_a_drive_that_was_not_kept_the_command_that_makes_its_recording_is_sa
     ("words", "code", "said"),
     [
         (["--frame", 3], 2, "--frame does not go with a fleet"),
-        (["--variant", "filtered"], 2, "--variant does not go with a fleet"),
+        (["--focus", "filterd"], 1, "no variant filterd; did you mean filtered? There are "),
         (["--worst", 99], 1, "there is no worst frame number 99: "),
     ],
 )

@@ -232,7 +232,14 @@ def test_a_variant_is_ranked_by_the_first_sign_that_it_has():
             seen(board, number, *(variant(name, masks[name], codes.get(name)) for name in names))
         found[names[0]] = sign_of(board.unlabelled.rows())
     assert found == {"sure": "entropy", "plain": "disagreement"}
-    assert sign_of(Unlabelled().rows()) is None
+    assert sign_of(Unlabelled("").rows()) is None
+
+
+def test_frames_without_truth_rank_by_the_focus():
+    board = Scoreboard(("street", "/camera"), EvaluationSettings(), ["a", "b"], None, focus="b")
+    seen(board, 0, variant("a", pixels("##..")), variant("b", pixels("....")))
+    rows = board.unlabelled.rows()
+    assert [*rows["variant"]] == ["b"]
 
 
 def test_where_there_is_no_room_for_the_whole_distance_it_is_halved_and_not_given_up():

@@ -20,7 +20,7 @@ import rerun as rr
 from roadeval.data import Doubt
 from roadeval.recording import recorder as recorder_module
 from roadeval.recording.layout import RecordingError, RecordRule
-from roadeval.recording.recorder import LEAST_FREE, Recorder
+from roadeval.recording.recorder import LEAST_FREE, Recorder, worst_error
 from roadeval.recording.recording import Recording
 from roadeval.recording.rows import (
     CHUNK_BYTES,
@@ -198,7 +198,15 @@ def recorded_with_too_little_room(path, limit):
     return done.stdout.splitlines()[-1]
 
 
-@pytest.mark.parametrize("share", [0.001, 0.02, 0.3, 0.6, 0.9, 0.99])
+@pytest.mark.parametrize(
+    "share",
+    [
+        0.001,
+        0.3,
+        0.99,
+        *(pytest.param(share, marks=pytest.mark.sweep) for share in (0.02, 0.6, 0.9)),
+    ],
+)
 def test_a_file_that_may_not_grow_ends_the_run_and_does_not_get_its_name(
     recording, tmp_path, share
 ):
@@ -325,6 +333,14 @@ def test_without_truth_the_most_doubtful_frames_are_kept(tmp_path):
             recorder.write(recorder.encode(each, number))
         recorder.finish(RESULTS)
     assert list(Recording(recorder.path).frame_numbers) == [1, 3]
+
+
+def test_frames_are_ranked_by_the_error_of_the_focus():
+    (other,) = result(0, err=0.9).tallies
+    (focus,) = result(0, err=0.1).tallies
+    both = replace(result(0), tallies=(other, replace(focus, variant="mine")))
+    assert worst_error(both, replace(layout(), focus="mine")) == 0.1
+    assert worst_error(result(0), replace(layout(), focus="mine")) == -1
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit, ValueError])

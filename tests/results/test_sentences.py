@@ -93,13 +93,12 @@ def test_the_headline_says_whether_limits_were_kept(holds, said):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("post.filtered.ERR > 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} holds"),
-        ("post.filtered.ERR < 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} does not hold"),
+        ("post.filtered.ERR > 1pp", "changed by +1.20 points, from 10.00 % to 11.20 % (limit: {})"),
         (
             "post.filtered.ERR > 1pp surely",
-            "changed by +1.20 pp [+0.50, +2.00] (10.00 % to 11.20 %): {} does not hold",
+            "changed by +1.20 points [+0.50, +2.00], from 10.00 % to 11.20 % (limit: {})",
         ),
-        ("post.filtered.ERR > 11%", "is 11.20 %: {} holds"),
+        ("post.filtered.ERR > 11%", "is 11.20 % (limit: {})"),
     ],
 )
 def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):

@@ -23,10 +23,10 @@ Rank = Annotated[
     int | None,
     arguments.option("--worst", "Rank of the frame to open; 1 is the worst.", "K", min=1),
 ]
-Variant = Annotated[
+Focus = Annotated[
     str | None,
     arguments.option(
-        "--variant",
+        "--variant --focus",
         "Variant by which frames rank. Default: what you brought, else filtered.",
         "NAME",
     ),
@@ -34,7 +34,7 @@ Variant = Annotated[
 Screenshot = Annotated[
     Path | None,
     arguments.option(
-        "--screenshot",
+        "-o --output --screenshot",
         "File for a picture of the frame; no window opens. Default: the worst frame with pictures.",
         "FILE.png",
     ),
@@ -47,12 +47,15 @@ def inspect(
     listed: Listed = False,
     frame: Frame = None,
     worst: Rank = None,
-    variant: Variant = None,
+    focus: Focus = None,
     camera: arguments.Camera = None,
     screenshot: Screenshot = None,
     json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
+
+        roadeval inspect recordings/drive.rrd --list
+        roadeval inspect recordings/drive.rrd --worst 1 --screenshot worst.png
 
     The viewer works offline and listens on 127.0.0.1 alone. Among neighbouring frames only the
     worst is listed. In a fleet the frames of all drives are ranked together, and the worst one
@@ -64,46 +67,42 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.select_camera(Result(recording), camera)
-    if opened.fleet and variant is not None:
-        raise typer.BadParameter("--variant does not go with a fleet, which ranks only its first")
+    opened = arguments.select_camera(Result(recording, focus=focus), camera)
     if opened.fleet and frame is not None:
         raise typer.BadParameter("--frame does not go with a fleet: give its drive's recording")
     if listed:
-        _list(opened, worst, variant, as_json=json)
+        _list(opened, worst, as_json=json)
     else:
-        _show(opened, frame, worst, variant, file=screenshot)
+        _show(opened, frame, worst, file=screenshot)
     for warning in opened.warnings:
         messages.warning(warning)
     return ExitCode.DONE
 
 
-def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bool) -> None:
+def _list(opened: Result, count: int | None, *, as_json: bool) -> None:
     """Print the worst frames, for people or as JSON."""
     from roadeval.cli.screens import inspect as screen
     from roadeval.jobs.results import inspect as job
     from roadeval.results.facts import json_text, plain
 
-    frames = job.worst_frames(opened, count or job.LISTED, variant)
+    frames = job.worst_frames(opened, count or job.LISTED)
     if as_json:
         console.emit(json_text(plain([asdict(frame) for frame in frames])).rstrip())
     else:
         screen.show(opened.name, frames, console.results(), of_fleet=opened.fleet is not None)
 
 
-def _show(
-    opened: Result, frame: int | None, rank: int | None, variant: str | None, *, file: Path | None
-) -> None:
+def _show(opened: Result, frame: int | None, rank: int | None, *, file: Path | None) -> None:
     """Open the viewer at a frame, which its number or rank names, or write its picture."""
     from roadeval.evaluation.metrics import TESTED
     from roadeval.jobs.results import inspect as job
 
     drive, place, why = opened.drive, "", ""
     if rank is not None or drive is None:
-        ranked = job.of_rank(opened, rank or 1, variant)
+        ranked = job.of_rank(opened, rank or 1)
         drive, place = job.drive_of(opened, ranked)
         frame = ranked.frame if frame is None else frame
-    elif file and frame is None and (worst := job.worst(drive, variant)):
+    elif file and frame is None and (worst := job.worst(drive)):
         which = "worst" if worst.by == TESTED else "first to look at"
         why = f", the {which} with pictures (--frame N or --worst K takes another)"
         frame = worst.frame

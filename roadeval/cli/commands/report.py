@@ -30,6 +30,7 @@ def report(
             callback=arguments.ending_in(".pdf", ".html", unnamed=(".htm", "")),
         ),
     ] = None,
+    focus: arguments.Focus = None,
     figures: Annotated[
         Path | None,
         arguments.option(
@@ -61,6 +62,9 @@ def report(
 ) -> int:
     """Write the report of a drive or of a fleet, as a PDF or as a page.
 
+        roadeval report recordings/drive.rrd -o drive.html
+        roadeval report reports/drive -o drive.pdf
+
     It shows whether the filter helps, where the errors are, which stage causes them, and which
     frames to look at. A recording is enough; the report of a results folder has no pictures. A
     page is one file that needs no network and no server.
@@ -68,7 +72,7 @@ def report(
     from roadeval.jobs.results.report import write_figures, write_report
     from roadeval.jobs.results.result import Result
 
-    opened = arguments.select_camera(Result(result), camera)
+    opened = arguments.select_camera(Result(result, focus=focus), camera)
     paths = write_figures(opened, figures, width=width, title=title) if figures else []
     if output or not figures:
         with progress.show(quiet) as watch:

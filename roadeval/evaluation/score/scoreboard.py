@@ -41,7 +41,7 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
-from roadeval.evaluation.score.metres import MetreSums
+from roadeval.evaluation.score.metre_sums import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
@@ -212,7 +212,8 @@ class Scoreboard:
 
     ``key`` are the drive and the camera; ``variants`` are all names, in the order of the tables;
     ``prior`` is the ``blind`` baseline, or None if no frame with truth was trained on; ``ground``
-    is what lies before the camera, if it is known.
+    is what lies before the camera, if it is known; ``focus`` is the variant by whose doubts frames
+    without truth rank, by default the first one.
     """
 
     def __init__(
@@ -222,6 +223,8 @@ class Scoreboard:
         variants: Sequence[str],
         prior: BlindPrior | None,
         ground: Ground | None = None,
+        *,
+        focus: str | None = None,
     ) -> None:
         if BASELINE in variants:
             raise ValueError(f"no variant may be called {BASELINE!r}")
@@ -243,7 +246,7 @@ class Scoreboard:
         self.changes = defaultdict[Transition, Change](Change)
         """Every change between masks."""
         self.curves = Curves()
-        self.unlabelled = Unlabelled()
+        self.unlabelled = Unlabelled(focus or next(iter(variants), ""))
         """The frames without truth."""
         self.apart: dict[int, Mapping[str, float]] = {}
         """ERR of the frames that were picked by rank, by number and variant."""

@@ -72,12 +72,16 @@ def _share(one: Packed, other: Packed) -> float:
 
 
 class Unlabelled:
-    """Collects the doubts on a drive's frames, and adds their flicker."""
+    """Collects the doubts on a drive's frames, and adds their flicker.
 
-    def __init__(self) -> None:
+    Frames are ranked by the doubts in the mask of ``focus``.
+    """
+
+    def __init__(self, focus: str) -> None:
+        self.focus: Final = focus
         self._stages: dict[str, str] = {}
         self._stamps, self._signs = array("q"), array("d")
-        """Numbers and stamps, and `SIGNS`, of the first variant, whose frames are ranked."""
+        """Numbers and stamps, and `SIGNS`, of the focus."""
         self._differ = defaultdict[tuple[str, str], list[float]](lambda: [0.0, 0])
         self._before: Mapping[str, Packed] = {}
 
@@ -93,7 +97,7 @@ class Unlabelled:
             doubt = replace(still, flicker=changed)
             doubts.append(doubt)
             self._stages[name] = doubt.stage
-            if name == next(iter(self._stages)):
+            if name == self.focus:
                 self._stamps.extend((result.frame.number, result.frame.stamp_ns))
                 self._signs.extend(getattr(doubt, sign) for sign in SIGNS)
             for other, share in doubt.differs.items():
@@ -107,12 +111,12 @@ class Unlabelled:
         self._before = {}
 
     def rows(self) -> pd.DataFrame:
-        """Return the rows of ``unlabelled.csv`` of the first variant, without the key."""
+        """Return the rows of ``unlabelled.csv`` of the focus, without the key."""
         import pandas as pd
 
         when = np.array(self._stamps, np.int64).reshape(-1, 2)
         table = pd.DataFrame(when, columns=["frame", "stamp_ns"])
-        table["variant"], table["stage"] = next(iter(self._stages.items()), ("", ""))
+        table["variant"], table["stage"] = self.focus, self._stages.get(self.focus, "")
         table[[*SIGNS]] = np.array(self._signs).reshape(-1, len(SIGNS))
         return table
 

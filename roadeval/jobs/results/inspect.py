@@ -8,18 +8,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS, sign_of
-from roadeval.evaluation.tables import finals, only, values_of
+from roadeval.evaluation.tables import finals, only
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
-from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -53,31 +51,27 @@ class WorstFrame:
     """The camera whose frame it is, in a rig."""
 
 
-def worst_frames(
-    result: Result, count: int | None = None, variant: str | None = None
-) -> list[WorstFrame]:
-    """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
+def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
+    """Rank the worst frames by ERR of the focus's mask; of neighbours only the worst counts.
 
-    The mask is that of the focus by default. If nothing was scored, frames are ranked by how much
-    it is in doubt, one a scene. Of a fleet the frames of all drives are ranked together, all that
-    are known by default, and always of the focus. A `RoadevalError` if there is nothing to rank by,
-    as when ERR is undefined on every frame, or there is no such variant.
+    If nothing was scored, frames are ranked by how much the mask is in doubt, one a scene. In a
+    fleet the frames of all drives are ranked together, all that are known by default. A
+    `RoadevalError` if there is nothing to rank by, as when ERR is undefined on every frame.
     """
     if fleet := result.fleet:
         if fleet.worst.empty:
             raise _nothing_scored(fleet.path)
         return [_of_fleet(fleet, row) for row in records(fleet.worst[:count])]
     cameras = result.rig or [drive for drive in [result.drive] if drive]
-    frames = [frame for camera in cameras for frame in _ranked(camera, count or LISTED, variant)]
+    frames = [frame for camera in cameras for frame in _ranked(camera, count or LISTED)]
     frames = sorted(frames, key=lambda frame: -(frame.rates[frame.by] or 0.0))[: count or LISTED]
     frames = [replace(frame, rank=rank) for rank, frame in enumerate(frames, 1)]
     if not frames:
         (path,) = result.paths
-        if not (scored := _scored(cameras[0])):
+        if not (focus := cameras[0].facts.focus):
             raise _nothing_scored(path)
         raise RoadevalError(
-            f"{path}: ERR of {variant or focus_of(scored)} is undefined on "
-            "every frame, so no frame is the worst"
+            f"{path}: ERR of {focus} is undefined on every frame, so no frame is the worst"
         )
     return frames
 
@@ -94,19 +88,15 @@ def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
 
 
 def _ranked(
-    drive: DriveResult, count: int, variant: str | None, among: Collection[int] | None = None
+    drive: DriveResult, count: int, among: Collection[int] | None = None
 ) -> list[WorstFrame]:
     """Rank a drive's frames, or those ``among`` them; none where ERR is undefined on all."""
-    rows, names, rates = drive.rows, _scored(drive), tuple(SHORT)
-    if not names:
-        rows = drive.table("unlabelled")
-        names, rates = values_of(rows, "variant"), tuple(SIGNS)
-    if not names:
+    rows, focus, rates = drive.rows, drive.focus, tuple(SHORT)
+    if drive.facts.focus is None:
+        rows, rates = drive.table("unlabelled"), tuple(SIGNS)
+    if focus is None:
         raise _nothing_scored(drive.path)
-    chosen = variant or focus_of(names) or names[0]
-    if chosen not in names:
-        raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
-    masks = finals(only(rows, variant=chosen))
+    masks = finals(only(rows, variant=focus))
     by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
         return []
@@ -115,14 +105,14 @@ def _ranked(
     ranked = tables.worst(looked_at, count, by, apart).to_dict("records")
     parts: dict[Any, Any] = {}
     if by == TESTED:
-        parts = tables.causes(rows, chosen).to_dict("index")
+        parts = tables.causes(rows, focus).to_dict("index")
     return [
         WorstFrame(
-            *(rank, drive.name, row["frame"], row["stamp_ns"], chosen, row["stage"]),
+            *(rank, drive.name, row["frame"], row["stamp_ns"], focus, row["stage"]),
             rates={rate: row[rate] for rate in rates},
             by=by,
             parts=parts.get(row["frame"], {}),
-            notes=drive.notes(row["frame"], chosen),
+            notes=drive.notes(row["frame"], focus),
             recording=drive.path if drive.recording else None,
             camera=drive.camera,
         )
@@ -158,17 +148,12 @@ def _nothing_scored(path: Path) -> RoadevalError:
     return RoadevalError(f"{path}: nothing was scored, so no frame is the worst")
 
 
-def _scored(drive: DriveResult) -> list[str]:
-    """Name the variants that were scored, without the baseline."""
-    return [name for name in values_of(drive.rows, "variant") if name != BASELINE]
-
-
-def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame:
+def of_rank(result: Result, rank: int) -> WorstFrame:
     """Return the frame of a rank among the worst.
 
     A `RoadevalError` if there are fewer, or as of `worst_frames`.
     """
-    frames = worst_frames(result, rank, variant)
+    frames = worst_frames(result, rank)
     if rank > len(frames):
         (path,) = result.paths
         raise RoadevalError(
@@ -178,14 +163,11 @@ def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame
     return frames[-1]
 
 
-def worst(drive: DriveResult, variant: str | None = None) -> WorstFrame | None:
-    """Return the worst frame that has pictures, of a variant or else of the focus.
-
-    None if no frame with pictures was scored. A `RoadevalError` if the variant was not scored.
-    """
-    if variant is None and not _scored(drive) and not len(drive.table("unlabelled")):
+def worst(drive: DriveResult) -> WorstFrame | None:
+    """Return the worst frame of the focus that has pictures; None if none was scored."""
+    if drive.focus is None:
         return None
-    return next(iter(_ranked(drive, 1, variant, among=drive.pictured)), None)
+    return next(iter(_ranked(drive, 1, among=drive.pictured)), None)
 
 
 def without_pictures(drive: DriveResult, frame: int) -> str:

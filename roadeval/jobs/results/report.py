@@ -13,7 +13,8 @@ from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
-from roadeval.jobs.results.frames import BYTES, FramePicker, browsed, evenly, strips_of
+from roadeval.jobs.results.frames import FramePicker, evenly
+from roadeval.jobs.results.page import BYTES, FILM_BYTES, browsed, film_of, strips_of
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Report
 from roadeval.report.document import document, page_document
@@ -34,11 +35,13 @@ def write_report(
     result: str | Path | Result,
     output: str | Path | None = None,
     *,
+    focus: str | None = None,
     on_progress: OnProgress = ignore,
 ) -> Path:
     """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
 
-    A `RoadevalError` if there is nothing to read there, or the file cannot be written.
+    A `RoadevalError` if there is nothing to read there, or no such focus, or the file cannot be
+    written.
 
     Parameters
     ----------
@@ -48,10 +51,12 @@ def write_report(
     output
         By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
         in ``.html`` gives a page.
+    focus
+        The variant that the report is about; see `roadeval.Result`, which has it if it was opened.
     on_progress
         Called with each pictured frame of a page.
     """
-    opened = result if isinstance(result, Result) else Result(result)
+    opened = result if isinstance(result, Result) else Result(result, focus=focus)
     (source,) = opened.paths
     name = opened.drive.camera if opened.drive else ""
     camera = f"-{as_plain(name)}" if name else ""
@@ -159,7 +164,11 @@ def page_of(result: Result, on_progress: OnProgress = ignore) -> Report:
         return page_document(findings, None, PICTURED_OF_FLEET)
     frames = browsed(result.drive)
     room = BYTES - len(page(page_document(findings, frames)))
-    strips = strips_of(result.drive, room, on_progress)
+    film = film_of(result.drive, min(room // 2, FILM_BYTES * len(frames.rows)), on_progress)
+    frames = replace(frames, film=film)
+    strips = strips_of(
+        result.drive, room - len(film.content) * 4 // 3 if film else room, on_progress
+    )
     return page_document(findings, replace(frames, strips=strips))
 
 

@@ -17,7 +17,7 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.comparison.pairing import ComparedDrive
 from roadeval.evaluation.score.scoreboard import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.tables import concatenate
+from roadeval.evaluation.tables import concatenate, values_of
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
     SUMMARY,
@@ -26,6 +26,7 @@ from roadeval.results.facts import (
     FleetFacts,
     FrameAccount,
     TrainingFacts,
+    focus_of,
     is_fleet,
 )
 from roadeval.results.fleet import FleetFolder, results_path
@@ -39,7 +40,7 @@ from roadeval.results.rows import (
     scores,
     table_of,
 )
-from roadeval.results.verdict import verdict
+from roadeval.results.verdict import verdict, with_focus
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -57,12 +58,14 @@ NO_NUMBER: Final = ("output", "run", "fleet")
 class DriveResult:
     """The result of a replay, from an ``.rrd`` or a results folder; of a rig that of a ``camera``.
 
-    A `RoadevalError` if it is neither, or by another program or format.
+    It is about ``focus`` if it has that variant, or else about what it was made about. A
+    `RoadevalError` if it is neither, or by another program or format.
     """
 
-    def __init__(self, path: str | Path, camera: str = "") -> None:
+    def __init__(self, path: str | Path, camera: str = "", focus: str | None = None) -> None:
         self.path = Path(path)
         self.camera: Final = camera
+        self._chosen: Final = focus
         self.recording: Recording | None = None
         if not self.path.is_dir():
             # Only here: a folder is read without what reads a recording.
@@ -129,6 +132,22 @@ class DriveResult:
     @cached_property
     def facts(self) -> Facts:
         """The facts; of an incomplete run, what its tables give."""
+        facts = self._written_facts()
+        if self._chosen:
+            return with_focus(facts, self._chosen, self.table("unlabelled"))
+        return facts
+
+    @property
+    def focus(self) -> str | None:
+        """The variant that the result is about, scored or not; None without any."""
+        if self.facts.focus:
+            return self.facts.focus
+        doubts = self.facts.unlabelled
+        return (
+            doubts.variant if doubts else focus_of(values_of(self.table("unlabelled"), "variant"))
+        )
+
+    def _written_facts(self) -> Facts:
         if not self.complete:
             assert self.recording is not None
             layout, settings = self.recording.layout, EvaluationSettings()
@@ -239,27 +258,31 @@ class DriveResult:
 Opened = DriveResult | FleetFolder
 
 
-def _open(path: Path) -> list[Opened]:
+def _open(path: Path, focus: str | None) -> list[Opened]:
     """Open a result; of a replay of several cameras that of each."""
     if is_fleet(path):
-        return [FleetFolder(path)]
+        return [FleetFolder(path, focus)]
     try:
-        drive = DriveResult(path)
+        drive = DriveResult(path, focus=focus)
     except SeveralCamerasError as error:
-        return [DriveResult(path, name) for name in error.cameras]
+        return [DriveResult(path, name, focus) for name in error.cameras]
     cameras = drive.facts.cameras if drive.recording is None else ()
-    return [DriveResult(path, name) for name in cameras] or [drive]
+    return [DriveResult(path, name, focus) for name in cameras] or [drive]
 
 
 class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 
-    A `RoadevalError` if one is none of these, or was made by another program or format.
+    A `RoadevalError` if one is none of these, or was made by another program or format, or none of
+    them has the focus.
 
     Parameters
     ----------
     paths
         Recordings, results folders and fleets' folders, perhaps from elsewhere.
+    focus
+        The variant that they are about: verdict, worst frames, pictures. By default what they were
+        made about.
 
     Examples
     --------
@@ -272,9 +295,18 @@ class Result:
     1 blind filtered unfiltered
     """
 
-    def __init__(self, *paths: str | Path) -> None:
+    def __init__(self, *paths: str | Path, focus: str | None = None) -> None:
         self.paths = tuple(map(Path, paths))
-        self._opened: list[Opened] = [result for path in self.paths for result in _open(path)]
+        self._chosen: Final = focus
+        self._opened: list[Opened] = [r for path in self.paths for r in _open(path, focus)]
+        if focus:
+            scored = [[*result.facts.finals] for result in self._opened]
+            doubts = [
+                values_of(result.table("unlabelled"), "variant")
+                for result in self._opened
+                if isinstance(result, DriveResult)
+            ]
+            focus_of(dict.fromkeys(chain.from_iterable(scored + doubts)), focus)
 
     @cached_property
     def cameras(self) -> dict[str, Result]:
@@ -314,11 +346,10 @@ class Result:
         (path, *_), first = self.paths, self._opened[0].facts
         if not self.rig:
             return first
-        if path.is_dir():
-            return Facts.read(path / SUMMARY)
         from roadeval.recording.recording import rig_facts
 
-        return rig_facts(path) or first
+        facts = Facts.read(path / SUMMARY) if path.is_dir() else rig_facts(path)
+        return with_focus(facts, self._chosen) if facts and self._chosen else facts or first
 
     @property
     def summary(self) -> dict[str, Any]:

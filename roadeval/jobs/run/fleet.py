@@ -104,6 +104,9 @@ def replay_fleet(
     if config.fleet.folds is not None and config.training.model is not None:
         problem = Sentence("does not go with {training.model}: folds train models")
         raise FleetError(problem, setting="fleet.folds")
+    if config.output.focus:
+        names = (name for entry in entries for name in entry.config(config).names())
+        config.check_focus(dict.fromkeys(names))
     writer = FleetWriter(Path(output))
     writer.begin()
     run = FleetRun(

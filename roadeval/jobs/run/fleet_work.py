@@ -28,12 +28,14 @@ from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import settings_digest, software
 from roadeval.jobs.run.replay import replay
 from roadeval.jobs.run.train import draw
-from roadeval.logs.truth.labels import label_files
+from roadeval.logs.truth.meaning import label_files
 from roadeval.recording.layout import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
-from roadeval.results.facts import SUMMARY, Facts, json_text
+from roadeval.results.facts import SUMMARY, Facts, focus_of, json_text
 from roadeval.results.fleet import (
+    APART_NS,
     CACHED,
+    OF_A_DRIVE,
     PICTURES,
     RECORDINGS,
     RESULTS,
@@ -47,7 +49,6 @@ from roadeval.results.fleet import (
 )
 from roadeval.results.rows import drive_row
 from roadeval.results.schema import FAILED
-from roadeval.results.verdict import focus_of
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import claim_files, find_partial, put, sha256_of
@@ -81,7 +82,13 @@ class DriveTask:
     @property
     def asked(self) -> str:
         """Digest of settings, software and model."""
-        return settings_digest(self.config, self.model, self.fold)
+        return settings_digest(self.config, self.model, self.fold, self.config.output.focus)
+
+    @property
+    def focus(self) -> str | None:
+        """The variant that was chosen as the focus, if the drive has it."""
+        chosen = self.config.output.focus
+        return chosen if chosen in self.config.names() else None
 
     @property
     def record(self) -> str:
@@ -206,12 +213,13 @@ def _replay(task: DriveTask) -> None:
         save=str(recording_path(folder, drive)) if task.record != "none" else None,
         reports=str(results_path(folder, drive)),
         record=task.record,
+        focus=task.focus,
         figures=False,
     )
     config = replace(
         task.config, output=output, run=replace(task.config.run, jobs=1), fleet=FleetSettings()
     )
-    pictures = WorstPictures()
+    pictures = WorstPictures(task.focus)
     outcome = replay(task.entry.source, config, on_frame=pictures.offer)
     _remove(task, PICTURES, *CACHED, *([RECORDINGS] if task.record == "none" else []))
     for frame, picture in pictures.kept.items():
@@ -378,10 +386,6 @@ def _draw_frames(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str,
     return drawn, passed
 
 
-WORST: Final = 3
-"""Frames of a drive that are kept as its worst."""
-APART_NS: Final = 1_000_000_000
-"""Neighbours fail alike: of frames less than this apart only the worst is kept."""
 WIDTH: Final = 320
 """Pixels across their pictures."""
 
@@ -389,7 +393,8 @@ WIDTH: Final = 320
 class WorstPictures:
     """Keeps pictures of the worst frames of a drive, by the final mask of its focus."""
 
-    def __init__(self) -> None:
+    def __init__(self, focus: str | None) -> None:
+        self._focus = focus
         self._worst: list[tuple[float, int, int, bytes]] = []
         """ERR, number, stamp and picture of each, the worst first."""
 
@@ -401,13 +406,13 @@ class WorstPictures:
     def offer(self, result: FrameResult) -> None:
         """Keep a frame as long as it is one of the worst; one without a rate is ignored."""
         frame = result.frame
-        variant = focus_of(tally.variant for tally in result.tallies)
+        variant = self._focus or focus_of(tally.variant for tally in result.tallies)
         errors = [t.rates[TESTED] for t in result.tallies if t.variant == variant]
-        if variant is None or math.isnan(error := errors[-1]):
+        if variant is None or not errors or math.isnan(error := errors[-1]):
             return
         near = [rival for rival in self._worst if abs(rival[2] - frame.stamp_ns) < APART_NS]
         rest = [rival for rival in self._worst if rival not in near]
-        rivals = [*near, *(rest[-1:] if len(rest) == WORST else [])]
+        rivals = [*near, *(rest[-1:] if len(rest) == OF_A_DRIVE else [])]
         if any(rival[0] >= error for rival in rivals):
             return
         # Painted when they are small: most are soon replaced by a worse frame's.
@@ -415,4 +420,4 @@ class WorstPictures:
         small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
         ranked = [*rest, (error, frame.number, frame.stamp_ns, picture)]
-        self._worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:WORST]
+        self._worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:OF_A_DRIVE]

@@ -31,11 +31,12 @@ from roadeval.jobs.run.frame import bind, external_layout, external_variant, run
 from roadeval.logs.errors import FrameError
 from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, merge_streams
 from roadeval.logs.log import Log
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.logs.truth.picks import Picks
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
 from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME, Layout
+from roadeval.results.facts import focus_of
 from roadeval.results.rows import Key, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
@@ -179,6 +180,7 @@ class Run:
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
+            focus=self.board.unlabelled.focus,
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
             calibration=self.calibration,
@@ -245,7 +247,11 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     prior = None if model.prior is None else BlindPrior(model.prior)
     names = [layout.name for layout in layouts]
     key = Key(log.name, camera or selection.image.name)
-    board = Scoreboard(key, config.evaluation, names, prior, selection.ground_as_read)
+    chosen = config.output.focus
+    # A camera of a rig may lack the masks that others have.
+    focus = focus_of(names, chosen if chosen in names else None)
+    ground = selection.ground_as_read
+    board = Scoreboard(key, config.evaluation, names, prior, ground, focus=focus)
     return Run(
         log,
         config,
@@ -300,7 +306,7 @@ COMPUTING: Final = (
 
 def deciding(config: RunConfig) -> RunConfig:
     """Return a configuration without what changes no number: output paths and who computes."""
-    output = OutputSettings(record=config.output.record)
+    output = OutputSettings(record=config.output.record, focus=config.output.focus)
     return replace(config, output=output, run=ExecutionSettings(), fleet=FleetSettings())
 
 
@@ -343,7 +349,8 @@ def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
     nowhere = "" if config.training.adapt else None  # wherever the file lies
     training = replace(config.training, model=nowhere)
     settings = deciding(config).without_places()
-    settings = replace(settings, training=training, masks=masks, truth=truth)
+    output = replace(settings.output, focus=None)
+    settings = replace(settings, training=training, masks=masks, truth=truth, output=output)
     text = json.dumps([settings.as_dict(), software(config), model, *more], sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 

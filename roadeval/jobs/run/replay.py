@@ -93,6 +93,7 @@ def replay(
     places = {"save": save, "reports": reports, "mcap": mcap}
     places_given = {name: str(path) for name, path in places.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": places_given}).resolved()
+    config.check_focus(config.names())
     with open_log(open_source(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):

@@ -18,7 +18,7 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score.fit import LAST_LAG, TRUTH, Finding, FitCheck, Misfit
 from roadeval.evaluation.score.scoreboard import DriveSums, drive_effects
-from roadeval.evaluation.score.unlabelled import Unlabelled, sign_of
+from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.stats.sampling import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.logs.errors import FrameError
@@ -26,7 +26,7 @@ from roadeval.logs.frames import Selection
 from roadeval.logs.log import Log
 from roadeval.logs.settings import LogConfig
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.logs.truth.picks import PICK, Picks
 from roadeval.results.facts import (
     DriveFacts,
@@ -40,7 +40,7 @@ from roadeval.results.facts import (
 )
 from roadeval.results.sentences import misfit
 from roadeval.results.tables import TableFacts
-from roadeval.results.verdict import verdict
+from roadeval.results.verdict import describe_doubts, verdict_on
 from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.version import VERSION
 
@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 
 FEW: Final = 12
 """Frames of a log that are looked at, with their neighbours, where nothing is replayed."""
-LOOKED_AT: Final = 10
-"""Frames without truth that are named as worth a look."""
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 """Signs that a frame has by itself, without the one before."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
@@ -66,21 +64,14 @@ def make_facts(
     parts, effects = sums.parts, sums.effects
     settings = run.config.training
     is_given = settings.model is not None and not settings.adapt
-    unlabelled = _unlabelled_facts(run.board.unlabelled)
-    estimated = _estimate_rates(run, sums.frames)
-    thresholds = dict(_best_thresholds(run))
-    varying = ["The images' sizes vary."] if run.frames.accounting.odd_sizes else []
-    misfits = [*_misfit_sentences(run)]
-    totals = parts["totals"]
-    told = verdict(totals, effects, thresholds, unlabelled=unlabelled, estimated=estimated)
-    return Facts(
+    facts = Facts(
         **parts,
         effects=[*effects],
-        verdict=Sentence(" ").join([*misfits, told, *varying]),
-        misfits=misfits,
-        unlabelled=unlabelled,
-        estimate=estimated,
-        thresholds=thresholds,
+        verdict="",
+        misfits=[*_misfit_sentences(run)],
+        unlabelled=_unlabelled_facts(run.board.unlabelled),
+        estimate=_estimate_rates(run, sums.frames),
+        thresholds=dict(_best_thresholds(run)),
         drive=DriveFacts(
             run.log.name,
             run.key.camera,
@@ -101,7 +92,7 @@ def make_facts(
             None if is_given else "picked" if run.schedule.picks else settings.placement,
             settings.adapt,
         ),
-        warnings=list(warnings(run, totals)),
+        warnings=list(warnings(run, parts["totals"])),
         losses=list(losses(run)),
         run=run.config.as_dict(),
         settings={variant.name: variant.pipeline.as_dict() for variant in run.variants},
@@ -111,20 +102,12 @@ def make_facts(
         masks=_mask_facts(run),
         tables=stated,
     )
+    return replace(facts, verdict=verdict_on(facts))
 
 
 def _unlabelled_facts(frames: Unlabelled) -> UnlabelledFacts | None:
-    """Return which frames without truth to look at, by the first variant."""
-    rows = frames.rows()
-    if not len(rows):
-        return None
-    first = str(rows["variant"][0])
-    sign, look_at = sign_of(rows), []
-    if sign is not None:
-        apart = tables.scene_ns(rows["stamp_ns"])
-        look_at = tables.worst(rows, LOOKED_AT, sign, apart)["frame"].tolist()
-    differing = as_tree(frames.differing().items())
-    return UnlabelledFacts(len(rows), first, sign, look_at, differing)
+    """Return which frames without truth to look at, by the focus."""
+    return describe_doubts(frames.rows(), as_tree(frames.differing().items()))
 
 
 def _estimate_rates(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
@@ -246,10 +229,9 @@ def join_cameras(
     for account in accounts:
         skipped.update(account.pop("skipped"))
     counted = {name: sum(account[name] or 0 for account in accounts) for name in accounts[0]}
-    return replace(
+    facts = replace(
         first,
         effects=effects,
-        verdict=Sentence(" ").join([*misfits, verdict(totals, effects)]),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
@@ -269,6 +251,7 @@ def join_cameras(
         tables=stated,
         cameras={**cameras},
     )
+    return replace(facts, verdict=verdict_on(facts))
 
 
 def _add_counts(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -123,6 +123,16 @@ def over_frames(
             from_zero=rate in SIGNS or not METRICS[rate].higher_is_better,
         )
         for rate in rates
+    ]
+
+
+def ribbons(charts: Sequence[Chart]) -> list[Chart]:
+    """Return a low chart for each series of a chart along the drive, all with one axis."""
+    return [
+        replace(chart, title=series.name, series=[series], y_range=(0.0, max(most, 1.0)), low=True)
+        for chart in charts
+        for most in [max((y for s in chart.series for _, y in s.points()), default=1.0)]
+        for series in chart.series
     ]
 
 

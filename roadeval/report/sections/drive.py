@@ -33,8 +33,8 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import CLAIMED, correction
 
 
-def over_drive(findings: Findings) -> Iterator[Block]:
-    """Yield the paper's claims and figures of the drive."""
+def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
+    """Yield the paper's claims and figures of the drive, with or without a heading."""
     claims = findings.facts.claims
     rows = [
         [words, f"{claims[name]['held']} of {claims[name]['windows']}"]
@@ -53,8 +53,9 @@ def over_drive(findings: Findings) -> Iterator[Block]:
         if drawn := figure.charts(findings.windows):
             blocks.append(Figure(drawn, f"{figure.caption}{points}"))
             points = ""
-    if blocks:
+    if blocks and heading:
         yield Heading("Over the drive")
+    if blocks:
         of_paper = "The paper's claims, and its figures 2, 3a and 3b"
         yield Details(of_paper if rows else "Masks and rates along the drive", blocks)
 
@@ -77,7 +78,8 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         for row in steps[steps["N"] > 0].to_dict("records"):  # a killed run has none
             yield Text(changed_pixels(row, int(pairs["wrong"].sum())))
         legend = caption("filter frame by frame", treated=FILTERED, control=UNFILTERED)
-        yield Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
+        figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
+        yield Details("The filter, frame by frame", [figure])
     yield from _over_time(findings)
 
 
@@ -159,10 +161,11 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     if not isinstance(findings, Findings):
         return
     trimaps = {n: m["trimap"] for n, m in findings.facts.beyond.items() if "trimap" in m}
-    if trimaps:
-        yield Figure([charts.trimap(trimaps)], caption("trimap"))
+    blocks: list[Block] = [Figure([charts.trimap(trimaps)], caption("trimap"))] if trimaps else []
     if findings.heatmaps:
-        yield _heat_maps(findings.heatmaps)
+        blocks.append(_heat_maps(findings.heatmaps))
+    if blocks:
+        yield Details("By distance from the road's edge, and by place in the image", blocks)
 
 
 def stages(findings: Findings) -> Iterator[Block]:

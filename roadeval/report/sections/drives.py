@@ -20,7 +20,6 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, marked_interval
-from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import elide
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
     for base in BASES:
         rows = only(findings.effects, base=base)
         if variants := values_of(rows, "variant"):
-            focus = focus_of(findings.finals)
+            focus = findings.facts.focus
             rows = only(rows, variant=focus if focus in variants else variants[0])
             differences[base] = rows.set_index("drive")["mean"]
     return differences
@@ -82,7 +81,7 @@ def table(findings: FleetFolder) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
     yield replace(drives_table(findings), find="Find drives, tags, states:")
-    yield note("sorted drives", variant=focus_of(findings.finals))
+    yield note("sorted drives", variant=findings.facts.focus)
 
 
 def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
@@ -224,7 +223,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
     rows = records(findings.worst[:most])
     if not rows:
         return
-    focus = focus_of(findings.finals)
+    focus = findings.facts.focus
     yield Heading("The worst frames over all drives")
     pictures = []
     for row in rows:

@@ -26,7 +26,6 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
-from roadeval.results.verdict import focus_of
 
 LOSSES: Final = 3
 """Most losses that are named."""
@@ -55,7 +54,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
         title = f"First frame to look at: {frame.frame}"
         if frame.rates:
             wrong = percent(frame.rates[frame.variant][TESTED], 1)
-            title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
+            title = caption("worst frame", frame=frame.frame, variant=frame.variant, ERR=wrong)
         command = findings.inspect(frame.frame) if findings.inspect else ""
         yield LinkList([(title, f"#frame-{frame.frame}")], command)
     if findings.totals:
@@ -64,7 +63,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
         legend = caption("thumbnails without truth")
-        if focus := focus_of(findings.finals):
+        if focus := findings.facts.focus:
             legend = caption("thumbnails", variant=focus, errors=caption("errors"))
         yield ImageGrid(pictures, 4, caption=legend)
     yield _beware([*warnings(findings)])

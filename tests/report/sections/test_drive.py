@@ -14,6 +14,7 @@ from roadeval.evaluation.tables import windows
 from roadeval.report.blocks import (
     Cell,
     Command,
+    Details,
     Figure,
     Heading,
     KeepTogether,
@@ -127,8 +128,8 @@ def of_regions(*regions, variants=VARIANTS):
 def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near():
     beyond = {name: {"trimap": {"1": [0, 0], "8": [3, 12]}} for name in VARIANTS[:2]}
     findings = some_findings(regions=of_regions("boundary", "interior"), beyond=beyond)
-    _, figure = (block for block in regions(findings) if isinstance(block, Figure))
-    (chart,) = figure.charts
+    (details,) = (block for block in regions(findings) if isinstance(block, Details))
+    (chart,) = details.blocks[0].charts
     assert chart.names == ["1", "8"]
     assert [each.name for each in chart.series] == ["filtered", "unfiltered"]
     assert [*chart.series[0].points()] == [(1, 25)]
