@@ -256,6 +256,12 @@ class FleetFolder:
         ]
         return rank_worst(concatenate([frames[:0], *parts]))
 
+    @cached_property
+    def pictured(self) -> pd.DataFrame:
+        """The rows of ``worst`` of every drive, not of the worst frames of all alone."""
+        scored = self.focus_scores["drive"]
+        return read_parquet([cached_path(self.path, "worst", drive) for drive in scored], "worst")
+
     def picture(self, frame: Mapping[str, Any]) -> bytes | None:
         """Return the JPEG of a row of ``worst``; None if it lies elsewhere, or is cut off."""
         path = self.path / str(frame["picture"] or "")
