@@ -62,8 +62,8 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     fleet = FleetFolder(outcome.folder)
     failed = fleet.drives.loc[[*outcome.problems]]
     for reason, drives in by_reason(fleet, failed).items():
-        told = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
-        yield f"{first_of(drives, NAMED)}: {told}"
+        sentence = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
+        yield f"{first_of(drives, NAMED)}: {sentence}"
 
 
 def manifest(facts: FleetFacts) -> Iterator[str]:
