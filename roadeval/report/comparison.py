@@ -244,7 +244,10 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
         if rows := [row for row in changes if row.changed]:
             shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
             title = f"{variant} of {result}" if len(comparison.results) > 2 else variant
-            yield Heading(f"Drives on which {title} changed{shown}, the surest first", 2)
+            title = f"{title} changed"
+            if result == variant:
+                title = f"{variant} differs from {comparison.results[0].label}"
+            yield Heading(f"Drives on which {title}{shown}, the surest first", 2)
             columns: Columns = {
                 "drive": lambda row: row.drive,
                 "frames": lambda row: number(row.frames),
