@@ -88,13 +88,15 @@ def commands() -> str:
 def _command(group: Any, name: str) -> Iterator[str]:
     command = group.commands[name]
     context = command.make_context(name, [], resilient_parsing=True)
-    yield from (f"## {name}", "", _plain(command.help), "")
+    text, examples, *others = command.help.split("\n\n")
+    shown = f"```console\n{textwrap.dedent(examples)}\n```"
+    yield from (f"## {name}", "", "\n\n".join([_plain(text), shown, *map(_plain, others)]), "")
     part = ""
     for param in command.get_params(context):
         flags, words = param.get_help_record(context) or ("", "")
-        of = getattr(param, "rich_help_panel", None) or (
-            "Arguments" if param.param_type_name == "argument" else "Options"
-        )
+        of = getattr(param, "rich_help_panel", None) or "Options"
+        if param.param_type_name == "argument":
+            of, flags = "Arguments", param.metavar
         if of != part:
             yield from ("", f"| {of} | |", "| --- | --- |")
         part = of

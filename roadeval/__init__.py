@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.results.compare import compare
     from roadeval.jobs.results.pick import pick
-    from roadeval.jobs.results.report import write_report
+    from roadeval.jobs.results.report import write_figures, write_report
     from roadeval.jobs.results.result import Result
     from roadeval.jobs.run.fleet import FleetOutcome, replay_fleet
     from roadeval.jobs.run.frame import run_frame
@@ -62,6 +62,7 @@ __all__ = [
     "run_frame",
     "save_model",
     "train",
+    "write_figures",
     "write_report",
 ]
 
@@ -72,7 +73,7 @@ _MODULES: Final = {
     "jobs.progress": ("Progress",),
     "jobs.results.compare": ("compare",),
     "jobs.results.pick": ("pick",),
-    "jobs.results.report": ("write_report",),
+    "jobs.results.report": ("write_figures", "write_report"),
     "jobs.results.result": ("Result",),
     "jobs.run.fleet": ("FleetOutcome", "replay_fleet"),
     "jobs.run.frame": ("run_frame",),

@@ -264,7 +264,8 @@ def perfect_shadow(numbers: Numbers) -> str:
     worse = sum(drive["perfect"] > drive["unfiltered"] for drive in rates)
     return textwrap.fill(
         "A better shadow mask would not mend it. On synthetic roads the true shadow is known, and "
-        "a replay runs the filter on that, too (`oracles.csv`). With a perfect shadow mask ERR is "
+        "a replay runs the filter on that, too (`oracles.csv`). The table above has the median of "
+        "five seeds; with the first seed and a perfect shadow mask ERR is "
         f"{errs['perfect']} % on the three drives, with the filter's own {errs['filtered']} %, and "
         f"without the filter {errs['unfiltered']} %: on {worse} of {len(rates)} the compensation "
         "harms even where nothing but shadow is compensated. A region gets the mean and the "

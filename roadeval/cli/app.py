@@ -8,17 +8,17 @@ import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Annotated, Any, Final
+from typing import Annotated, Final, cast
 
 import typer
-from typer.core import TyperCommand
 
 from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.help import WIDEST, Command, Program
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
 from roadeval.runtime.sentence import Sentence
-from roadeval.runtime.text import debug, defect
+from roadeval.runtime.text import debug, defect, likely
 
 FIRST: Final = (
     *("replay", "fleet", "report", "inspect", "compare"),
@@ -32,34 +32,17 @@ THREADS: Final = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"}
 """The variables that OpenBLAS reads, in its order."""
 
 app = typer.Typer(
-    add_completion=False,
+    cls=Program,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDEST},
 )
-
-
-class GroupedCommand(TyperCommand):
-    """A command whose help shows the options group by group."""
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write arguments and options, each group below its title."""
-        groups: dict[str, list[tuple[str, str]]] = {}
-        for param in self.get_params(ctx):
-            if record := param.get_help_record(ctx):
-                default = "Arguments" if param.param_type_name == "argument" else "Options"
-                group = getattr(param, "rich_help_panel", None) or default
-                groups.setdefault(group, []).append(record)
-        for group, records in groups.items():
-            with formatter.section(group):
-                formatter.write_dl(records)
-
 
 _others = sorted({module.name for module in iter_modules(commands.__path__)} - {*FIRST})
 for _name in (*FIRST, *_others):
     # A command is the function that has the name of its file.
     _module = import_module(f"{commands.__name__}.{_name}")
-    app.command(cls=GroupedCommand)(getattr(_module, _name))
+    app.command(cls=Command)(getattr(_module, _name))
 
 
 def _show_version(show: bool) -> None:
@@ -78,13 +61,11 @@ def _root(
         typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version."),
     ] = False,
 ) -> None:
-    """Flight recorder and scoreboard for road recognition.
-
-    Exit codes: 0 done; 1 a file cannot be used; 2 wrong usage; 3 done, but part of the log was
-    lost; 4 a --fail-if condition held; 70 a defect of the program; 130, 143 interrupted.
-    """
+    """Flight recorder and scoreboard for road recognition."""
     if context.invoked_subcommand is None:
-        typer.echo(context.get_help(), err=True)
+        formatter = context.make_formatter()
+        cast("Program", context.command).format_start(context, formatter)
+        typer.echo(formatter.getvalue().rstrip(), err=True)
         raise typer.Exit(ExitCode.USAGE)
 
 
@@ -130,6 +111,8 @@ def explain(error: BaseException) -> int:
         case BrokenPipeError() | SystemExit(__context__=BrokenPipeError()):
             console.drop()
             return ExitCode.BROKEN_PIPE
+        case SystemExit(code=int(code)):
+            return code  # as Typer's completion ends
         case RoadevalError():
             code, sentence = ExitCode.FAILED, error.sentence
         case OSError(strerror=str(reason)):
@@ -159,7 +142,13 @@ def _usage_message(error: typer.TyperException) -> str:
         error.message = describe_problem(error.__cause__.errors()[0])
     # If options do not go together, no parameter is to blame, and no value is invalid.
     is_alone = isinstance(error, typer.BadParameter) and error.param is None
-    text = error.message if is_alone else error.format_message()
+    # Typer's own guess at an unknown option does not see that it begins like another one.
+    is_unknown = hasattr(error, "possibilities")
+    text = error.message if is_alone or is_unknown else error.format_message()
     sentence = " ".join(text.split()).rstrip(".")
     context = getattr(error, "ctx", None)
-    return f"{sentence}; see '{context.command_path} --help'" if context else sentence
+    if context is None:
+        return sentence
+    flags = [flag for param in context.command.get_params(context) for flag in param.opts]
+    meant = likely(str(getattr(error, "option_name", "")), flags) if is_unknown else ""
+    return f"{sentence}; {meant}see '{context.command_path} --help'".replace("?;", "?")

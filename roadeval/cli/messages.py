@@ -39,7 +39,9 @@ def losses(sentences: Sequence[str]) -> ExitCode:
 
 def conditions(held: Sequence[str], unjudged: Sequence[str]) -> ExitCode:
     """Write which conditions hold and which could not be judged; return the exit code."""
-    for sentence in (*held, *unjudged):
+    for sentence in held:
+        error(f"limit exceeded: {sentence}")
+    for sentence in unjudged:
         error(sentence)
     if held:
         return ExitCode.CONDITION_HELD
@@ -72,8 +74,12 @@ def _write(kind: str, style: str, sentence: str) -> None:
     try:
         from rich.text import Text
 
-        line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", text)
-        console.diagnostics().print(line, soft_wrap=True)
+        line, stderr = f"{PROGRAM}: {kind}: {text}", console.diagnostics()
+        # A file has a line for each message; a terminal would break a long one inside a word.
+        shown = console.wrap(line, stderr.width, 0, 4) if stderr.is_terminal else Text(line)
+        begin = len(PROGRAM) + 2
+        shown.stylize(style, begin, begin + len(kind) + 1)
+        stderr.print(shown, soft_wrap=True)
     except (ImportError, MemoryError):
         # If memory is short, the library does not load.
         sys.stderr.write(f"{PROGRAM}: {kind}: {text}\n")

@@ -37,26 +37,24 @@ class MethodSettings:
     preset: Annotated[
         str | None, Flag("--preset", "paper|printed|printed_order|hsi|gated|robust")
     ] = None
-    """Preset to start from: the equations as meant (the default), the misprints taken literally,
-    the paper with its own order of post-processing, the paper with shadow compensated in HSI, a
-    more careful shadow filter, or a pipeline for use on the road."""
+    """Preset to start from; paper: equations as meant (the default); printed: their misprints taken
+    literally; printed_order: the paper's post-processing order; hsi: shadow compensated in HSI;
+    gated: a more careful shadow filter; robust: best on real roads."""
     config: Annotated[Path | None, Flag("--config", "FILE.toml")] = None
     """File of settings on top of the preset: an edited output of 'roadeval config', the run.toml of
     an earlier run, or the recording of that run."""
-    variants: Annotated[
-        Mapping[str, str | None], Flag("--variant", "NAME=FILE.toml|NAME=PRESET|PRESET")
-    ] = dataclasses.field(default_factory=dict)
-    """Further variant beside filtered and unfiltered, from a file or a preset."""
+    variants: Annotated[Mapping[str, str | None], Flag("--variant", "NAME=FILE|PRESET")] = (
+        dataclasses.field(default_factory=dict)
+    )
+    """Further variant: a preset, as robust, or a file of settings."""
     nets: Annotated[Mapping[str, str], Flag("--net", "NAME=FILE")] = dataclasses.field(
         default_factory=dict
     )
-    """Network as a further variant: an ONNX file, or a TOML file with its settings, as the size of
-    its input."""
-    masks: Annotated[Mapping[str, str], Flag("--masks", "NAME=FOLDER|LOG:TOPIC|FILE.toml")] = (
-        dataclasses.field(default_factory=dict)
+    """Network as a further variant: an ONNX file, or a TOML file that names one."""
+    masks: Annotated[Mapping[str, str], Flag("--masks", "NAME=PATH")] = dataclasses.field(
+        default_factory=dict
     )
-    """Masks as a further variant: of a folder, of another log, or of a TOML file that states their
-    path and more, as a threshold of confidences."""
+    """Masks as a further variant: a folder, LOG.mcap:/topic, or a TOML file."""
     tunes: Annotated[tuple[str, ...], Flag("--tune", "NAME")] = ()
     """Method, as a network, that is corrected in a further variant NAME_tuned, which learns from
     this drive's first labelled frames. Its trees use the method's output and all features of the
@@ -72,7 +70,13 @@ class MethodSettings:
     counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration or of Kalibr."""
 
 
-GROUPS: Final = ("Output", "Methods", "Training", "Truth", "Range", "Input", "Execution", "Fleet")
+MOST_USED: Final = "Most used"
+FIRST: Final = ("truth.path", "labels.road", "nets", "masks", "variants", "output.reports")
+"""Settings whose flags most people need, in the order of that group."""
+GROUPS: Final = (
+    *(MOST_USED, "Output", "Methods", "Training", "Truth", "Range"),
+    *("Input", "Execution", "Fleet"),
+)
 """The groups of the help, in their order."""
 TABLES: Final[Mapping[str, tuple[type, str]]] = {
     "": (MethodSettings, "Methods"),
@@ -113,9 +117,12 @@ class Option:
 
     def parameter(self) -> inspect.Parameter:
         """Return the parameter from which Typer makes the option."""
+        names = (self.metavar or "").split("|")
+        is_choice = all(re.fullmatch("[a-z_]+", name) for name in names)
         option = typer.Option(
             *self.flags,
             metavar=self.metavar,
+            autocompletion=(lambda: names) if is_choice else None,
             show_default=False,
             help=self.help,
             readable=False,  # a file is checked where it is opened
@@ -144,14 +151,15 @@ def _make_options() -> Iterator[Option]:
             if flag is not None:
                 flags = tuple(flag.names.split())
                 kind, read = _kind(hint, f"{flags[-1]} {flag.metavar.partition('=')[0]}")
+                setting = f"{table}.{field.name}".removeprefix(".")
                 yield Option(
-                    f"{table}.{field.name}".removeprefix("."),
+                    setting,
                     flags,
                     flag.metavar or None,
                     _help(texts[field.name], kind, field.default),
                     kind,
                     read,
-                    flag.group or group,
+                    MOST_USED if setting in FIRST else flag.group or group,
                 )
 
 
@@ -224,7 +232,13 @@ def read_named(names: str, text: str, *, alone: bool = False) -> tuple[str, str 
     return name[0], value
 
 
-OPTIONS: Final = tuple(sorted(_make_options(), key=lambda option: GROUPS.index(option.group)))
+def _place(option: Option) -> tuple[int, int]:
+    """Return the place of an option in the help: that of its group, and that in the first group."""
+    first = FIRST.index(option.setting) if option.setting in FIRST else 0
+    return GROUPS.index(option.group), first
+
+
+OPTIONS: Final = tuple(sorted(_make_options(), key=_place))
 """In the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "topics.image": "--image-topic"
@@ -245,6 +259,8 @@ def with_flags(text: str) -> str:
         match setting.split(".", 2):
             case "masks", name, key:
                 return f"`{key}` in the file of {FLAGS['masks']} {name}=FILE.toml"
+            case "net", key:
+                return f"`{key}` in the file of {FLAGS['nets']} NAME=FILE.toml"
             case "topics", "masks", name:
                 return f"{FLAGS['topics.masks']} {name}"
         return FLAGS.get(setting, f"`{setting}`")

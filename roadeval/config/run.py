@@ -59,7 +59,7 @@ from roadeval.recording.layout import RecordRule
 from roadeval.results.facts import focus_of
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.settings import meanings
-from roadeval.runtime.text import visible, visible_lines
+from roadeval.runtime.text import likely, visible, visible_lines
 from roadeval.training.settings import TrainingSettings
 
 OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks", "ground")
@@ -102,7 +102,7 @@ class RunConfig(LogConfig):
                 raise ConfigError(
                     f"there is no variant {name}",
                     setting="only",
-                    remedy=f"choose {list_names(names)}",
+                    remedy=f"{likely(name, names)}choose {list_names(names)}",
                 )
         self._check_cameras()
         try:
@@ -268,7 +268,8 @@ class RunConfig(LogConfig):
         variants = []
         for name in names:
             if name not in pipelines and name not in masks:
-                remedy = f"choose {list_names({*pipelines, *masks} - {FILTERED, UNFILTERED})}"
+                methods = {*pipelines, *masks} - {FILTERED, UNFILTERED}
+                remedy = f"{likely(name, methods)}choose {list_names(methods)}"
                 raise ConfigError(f"there is no method {name}", setting="tunes", remedy=remedy)
             variants.append(tuned_variant(name, pipelines.get(name)))
         return self.with_variants(variants)

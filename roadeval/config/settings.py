@@ -23,9 +23,8 @@ class OutputSettings:
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
     """File of the recording. Default: ``recordings/<drive>.rrd``."""
-    reports: Annotated[str | None, Flag("-o --reports", "DIR")] = None
-    """Folder of tables and figures. Default: ``reports/<drive>/``, or, with ``--save new.rrd``,
-    ``reports/new/``."""
+    reports: Annotated[str | None, Flag("-o --output --reports", "DIR")] = None
+    """Folder of tables and figures. Default: ``reports/<recording>/``."""
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
     """Log of masks, error maps and rates, to open beside the drive. Default: none."""
     record: Annotated[str, Flag("--record", "WHAT")] = "all"

@@ -16,7 +16,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from roadeval.errors import RoadevalError, SettingError
 from roadeval.runtime.documents import read_toml
 from roadeval.runtime.files import check_input
-from roadeval.runtime.text import is_utf8, visible
+from roadeval.runtime.text import is_utf8, likely, visible
 
 PLAIN_WORDS: Final[Mapping[str, str]] = {
     "int_": "must be a whole number",
@@ -165,7 +165,7 @@ def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
         if names is not None and key not in names:
             if not names:
                 raise ConfigError("it has no settings", setting=setting)
-            choice = f"choose {list_names(names)}"
+            choice = f"{likely(key, names)}choose {list_names(names)}"
             raise ConfigError("there is no such setting", setting=setting, remedy=choice)
         if isinstance(value, Mapping):
             _check(value, getattr(settings, key, None), setting)

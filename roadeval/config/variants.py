@@ -28,6 +28,7 @@ from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import Stage
 from roadeval.runtime.sentence import Sentence
+from roadeval.runtime.text import likely
 
 PAPER_CHAIN: Final = ("shadow", "similarity", "svm", "post")
 
@@ -139,7 +140,7 @@ def preset_of(tables: Mapping[str, Any]) -> str:
     """Return the name of the preset of some tables; a `ConfigError` if there is no such preset."""
     name = tables.get("preset", "paper")
     if not isinstance(name, str) or name not in PRESETS:
-        remedy = f"choose {list_names(PRESETS)}"
+        remedy = f"{likely(str(name), PRESETS)}choose {list_names(PRESETS)}"
         raise ConfigError(f"there is no {name!r}", where="preset", remedy=remedy)
     return name
 
@@ -151,7 +152,8 @@ def check_tables(tables: Mapping[str, Any], allowed: Collection[str]) -> None:
         if key in allowed:
             continue
         if isinstance(table, Mapping):
-            raise ConfigError(f"[{key}] is no table here", remedy=f"choose {names}")
+            meant = likely(key, allowed)
+            raise ConfigError(f"[{key}] is no table here", remedy=f"{meant}choose {names}")
         raise ConfigError(f"{key} is in no table", remedy=f"put it below one of {names}")
 
 

@@ -86,7 +86,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     try:
         inside = sorted(filter(is_shown, path.iterdir()), key=natural)
     except OSError as error:
-        raise LogError(f"{path}: {error.strerror or error}") from error
+        raise LogError(str(error.strerror or error), where=path) from error
     there = [file for file in inside if file.suffix == ".mcap"]
     problems = {file: problem for file in there if (problem := _problem(file))}
     damage = [Damage(file, 0, problem) for file, problem in problems.items()]
@@ -196,9 +196,9 @@ def list_files(folder: Path, endings: Collection[str], *, below: bool = False) -
         files = [file for file in inside if file.suffix.lower() in endings and is_shown(file)]
     except OSError as error:
         names = {NotADirectoryError: "a file, not a folder", FileNotFoundError: "no such folder"}
-        raise LogError(f"{folder}: {names.get(type(error), error.strerror)}") from error
+        raise LogError(str(names.get(type(error), error.strerror)), where=folder) from error
     if not files:
-        raise LogError(f"{folder}: no image in it ({', '.join(sorted(endings))})")
+        raise LogError(f"no image in it ({', '.join(sorted(endings))})", where=folder)
     return sorted(files, key=natural)
 
 

@@ -26,7 +26,7 @@ from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
 from roadeval.logs.topics.calibration import calibration_of, is_rectified
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
-from roadeval.logs.truth.labels import (
+from roadeval.logs.truth.meaning import (
     Labels,
     LabelSource,
     check_size,

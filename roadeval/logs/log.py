@@ -32,9 +32,9 @@ from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
-from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.labels import LabelSource, log_and_topic, source_beside_log
-from roadeval.logs.truth.names import find_keys, shown_name
+from roadeval.logs.truth.label_files import labels_in
+from roadeval.logs.truth.meaning import LabelSource, log_and_topic, source_beside_log
+from roadeval.logs.truth.named_labels import find_keys, shown_name
 from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import visible
 
@@ -86,7 +86,7 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
         readers = topic_readers(containers, limits, lacks_files=bool(damage))
         topics = tuple(describe_topic(reader) for _, reader in sorted(readers.items()))
     except (BadRecord, OSError) as error:
-        raise LogError(f"{path}: {error}") from error
+        raise LogError(str(error), where=path) from error
     name = path.stem if path.is_file() or opened is not None else path.resolve().name
     return Log(path, source, visible(name), config, topics, readers, containers, damage, states)
 
@@ -151,7 +151,7 @@ class Log:
             with suppress(OSError):
                 now = _state(file.stat())
                 if now != before and now[0] == before[0]:  # one of another inode is not read
-                    raise LogError(f"{file}: it changed while it was read; run again")
+                    raise LogError("it changed while it was read", where=file, remedy="run again")
         for container in self.containers:
             if self.size <= SMALL or not container.is_covered:
                 container.verify_data()
@@ -181,7 +181,7 @@ class Log:
         try:
             parts = [container.fingerprint() for container in self.containers]
         except BadRecord as error:
-            raise LogError(f"{self.path}: {error}") from error
+            raise LogError(str(error), where=self.path) from error
         return hashlib.sha256(b"\n".join(parts)).hexdigest()
 
     def verify(self, on_bytes: Callable[[int, int], object] | None = None) -> str | None:
@@ -270,7 +270,7 @@ class Log:
         if topic is None:
             choice = choose_truth(other.topics, camera.topic, None, settings.labels)
             if choice.topic is None:
-                raise LogError(f"{log}: {choice.why}; name its topic, as {log}:/topic")
+                raise LogError(choice.why, where=log, remedy=f"name its topic, as {log}:/topic")
             topic = choice.topic.name
         reader = other.readers[named(other.topics, topic, "truth.path").name]
         name = "" if other.path.resolve() == self.path.resolve() else other.name
@@ -299,8 +299,10 @@ class Log:
         if first >= last:
             begin, end = ((int(time) - self.start_ns) / NS for time in (times[0], times[-1]))
             raise LogError(
-                f"{self.path.name}: no frame in this range; the images lie from {begin:.3f} to "
-                f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
+                "no frame in this range",
+                where=self.path.name,
+                remedy=f"the images lie from {begin:.3f} to {end:.3f} seconds after the log's "
+                f"start ({times[0]} to {times[-1]} ns)",
             )
         numbers: Sequence[int] = range(first, last)
         most = settings.every * (settings.max_frames or last)

@@ -133,7 +133,7 @@ class LabelSettings:
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
-    """Truth values that mean road (in an image with a palette its indices), or names of classes."""
+    """Truth values (of a palette: its indices), or names of classes, that mean road."""
     ignore: Annotated[tuple[Value | Name, ...], Flag("--ignore-label", "V|NAME")] = ()
     """Truth values, or names of classes, that are not counted."""
     road_colors: Annotated[tuple[Color, ...], Flag("--road-color", "R,G,B")] = ()
@@ -165,8 +165,8 @@ class LabelPlace:
     """Road truth that lies beside the log, and how it is paired with the log's frames."""
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
-    """A folder of label images or NPY files, one a frame; files of an annotation tool (COCO, CVAT,
-    LabelMe, YOLO, Label Studio, Cityscapes, BDD100K, VIA); or LOG.mcap:/topic. In the path
+    """Folder of labels, one a frame (images, NPY); COCO, CVAT, LabelMe, YOLO, Label Studio,
+    Cityscapes, BDD100K, VIA; or LOG.mcap:/topic. In the path
     ``{drive}`` is the name of the drive's file without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
     """The pairing of labels with frames: by ``number``, by which the labels' names differ, or by

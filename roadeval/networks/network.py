@@ -254,7 +254,7 @@ def complete_settings(settings: NetSettings, file: OnnxFile) -> NetSettings:
     names = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(names) > 1:
         name_them = Sentence("name those that show road by {net.outputs}")
-        raise file.question("gives several outputs", name_them)
+        raise file.question("gives several outputs", name_them, f'outputs = ["{names[0]}"]')
     outputs = settings.outputs or names
     if unknown := [name for name in outputs if name not in names]:
         see = Sentence("see {net.outputs}")
@@ -406,11 +406,12 @@ def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     count, rows, columns = shape[1:] if layout == "NCHW" else (shape[3], shape[1], shape[2])
     if settings.layout is None and count not in (1, 3):
         give = Sentence("give it by {net.layout}")
-        raise file.question("does not say the order of its input's lengths", give)
+        problem = "does not say the order of its input's lengths"
+        raise file.question(problem, give, 'layout = "NCHW"')
     width, height = settings.size or (columns, rows)
     if width is None or height is None:
-        give = Sentence("give width and height by {net.size}, as [512, 256]")
-        raise file.question("takes images of any size", give)
+        give = Sentence("give width and height by {net.size}")
+        raise file.question("takes images of any size", give, "size = [512, 256]")
     if columns not in (None, width) or rows not in (None, height):
         see = Sentence("see {net.size}")
         raise file.question(f"takes no input of {width}x{height}", see)
@@ -466,7 +467,7 @@ def complete_output(
     road = settings.road or named or ((count - 1,) if count <= 2 else ())
     if not road:
         give = Sentence("give the numbers of those that are road by {net.road}")
-        raise file.question(f"tells {count} classes apart", give)
+        raise file.question(f"tells {count} classes apart", give, "road = [1]")
     if max(road) >= count:
         see = Sentence("see {net.road}")
         raise file.question(f"has no class {max(road)}, but {count} from 0", see)
@@ -495,5 +496,5 @@ def complete_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSet
         road = (1,)  # a single class is written as 1, whatever its number is
     if not road:
         give = Sentence("give the numbers of those that are road by {net.road}")
-        raise file.question("gives numbers of classes", give)
+        raise file.question("gives numbers of classes", give, "road = [1]")
     return replace(settings, road=road, activation="classes", decide="argmax")

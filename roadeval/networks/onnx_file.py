@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import re
 import subprocess
@@ -123,11 +124,17 @@ class OnnxFile:
         """Return an error about the file."""
         return NetworkError(problem, where=self.path, remedy=remedy)
 
-    def question(self, problem: str, remedy: str = "") -> NetworkError:
-        """Return an error that asks for a missing setting, and lists inputs and outputs."""
+    def question(self, problem: str, remedy: str = "", line: str = "") -> NetworkError:
+        """Return an error that asks for a missing setting, and lists inputs and outputs.
+
+        ``line`` is one of a TOML file that might answer.
+        """
         inputs = first_of([*map(str, self.inputs)], _SHOWN)
         outputs = first_of([*map(str, self.outputs)], _SHOWN)
         listed = f" (inputs: {inputs}; outputs: {outputs})"
+        if line:
+            file = f"`file = {json.dumps(str(self.path))}` and `{line}`"
+            remedy = Sentence("{}, with lines such as {}", remedy, file)
         if remedy:
             return self.error(problem, Sentence("{}{}", remedy, listed))
         return self.error(f"{problem}{listed}")
@@ -146,7 +153,7 @@ def load(settings: NetSettings) -> OnnxFile:
         check_input(path)
         status = path.stat()
     if status.st_size > LARGEST:
-        raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
+        raise NetworkError("larger than 2 GiB, which no ONNX file is", where=path)
     state = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
     file = _open(path, settings.seconds, *state)
     if settings.sha256 not in (None, file.sha256):
@@ -165,12 +172,12 @@ def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
         model = memoryview(content)
         beside = sorted(set(weight_files(model)))
     except ValueError as error:
-        raise NetworkError(f"{path}: {_DAMAGED}") from error
+        raise NetworkError(_DAMAGED, where=path) from error
     digest = hashlib.sha256(content)
     for name in beside:
         inner = PurePosixPath(name)
         if inner.is_absolute() or ".." in inner.parts or "\\" in name or ":" in name:
-            raise NetworkError(f"{path}: asks for weights outside its folder: {visible(name)}")
+            raise NetworkError(f"asks for weights outside its folder: {visible(name)}", where=path)
         with reading(path, f"its weights lie in {visible(name)} beside it, which cannot be read"):
             check_input(path.parent / inner)
             with (path.parent / inner).open("rb") as file:
@@ -187,7 +194,7 @@ def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
         late = _LATE.format(seconds, "", "open")
         raise NetworkError(late, where=path, remedy=_MORE_TIME) from error
     if ending.returncode not in (0, 1):
-        raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
+        raise NetworkError("damaged: onnxruntime ends its process as it opens it", where=path)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # it raises what it logs
@@ -208,7 +215,7 @@ def reading(path: Path, problem: str) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise NetworkError(f"{path}: {problem}: {reason}") from error
+        raise NetworkError(f"{problem}: {reason}", where=path) from error
 
 
 @contextmanager
@@ -222,11 +229,11 @@ def explaining(path: Path) -> Iterator[None]:
         raise
     except Exception as error:  # onnxruntime's errors have no common class
         if type(error).__name__ in ("InvalidProtobuf", "UnicodeDecodeError"):
-            raise NetworkError(f"{path}: {_DAMAGED}") from error
+            raise NetworkError(_DAMAGED, where=path) from error
         message = visible(" ".join(_PREAMBLE.sub("", str(error)).split()))
         quoted = message if len(message) <= QUOTED else f"{message[:QUOTED]}..."
         library = f"onnxruntime {onnxruntime.__version__}"
-        raise NetworkError(f"{path}: {library} cannot run the network: {quoted}") from error
+        raise NetworkError(f"{library} cannot run the network: {quoted}", where=path) from error
 
 
 # An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. Any other file is a

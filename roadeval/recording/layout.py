@@ -55,6 +55,8 @@ CELL: Final = 0.16
 """Side of a cell of the ground seen from above, in metres."""
 NOTES: Final = "/notes"
 GUIDE: Final = "/results/guide"
+FRAME_RATES: Final = "/results/frame"
+"""Below this path lie each variant's rates of a frame, in percent, as a text for the viewer."""
 LAYOUT: Final = "/results/layout"
 SHOWN: Final = "/results/images"
 """The frames that have images, with their header stamps."""

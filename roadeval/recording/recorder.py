@@ -32,8 +32,8 @@ from roadeval.data import (
     LayerKind,
 )
 from roadeval.data.arrays import IGNORED
-from roadeval.data.words import short_names
-from roadeval.evaluation.metrics import TESTED
+from roadeval.data.words import percent, short_names
+from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.geometry.plan import Plan
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
@@ -59,6 +59,8 @@ class EncodedFrame(NamedTuple):
     """All states, empty where undefined."""
     notes: tuple[tuple[str, str], ...]
     """Sentences with their levels."""
+    texts: Mapping[str, str]
+    """Rates in words."""
     error: float
     """The value that ranks frames, see `worst_error`."""
 
@@ -136,6 +138,18 @@ def _numbers(
                 yield f"/facts/{mask}/{name}", (value,)
 
 
+def _rates_in_words(result: FrameResult, layout: Layout) -> Iterator[tuple[str, str]]:
+    """Yield the rates of each variant's final mask by entity path."""
+    finals = {(variant.name, variant.stages[-1]): variant.name for variant in layout.variants}
+    rates = {name: "not scored" for name in finals.values() if layout.has_truth}
+    for tally in result.tallies:
+        if name := finals.get((tally.variant, tally.stage)):
+            lines = (f"{rate} {percent(tally.rates[rate])} %" for rate in SHORT)
+            rates[name] = "\n".join(lines)
+    for name, text in rates.items():
+        yield f"{at.FRAME_RATES}/{name}", f"This frame:\n{text}"
+
+
 def worst_error(result: FrameResult, layout: Layout) -> float:
     """Return the error rate of the focus's final mask; -1 for a frame not evaluated.
 
@@ -167,7 +181,7 @@ class WorstFrames:
 
     def offer(self, encoded: EncodedFrame) -> None:
         """Keep a frame's images if it is among the worst; among equal frames the earlier ones."""
-        bare = encoded._replace(numbers={}, states={}, notes=())
+        bare = encoded._replace(numbers={}, states={}, notes=(), texts={})
         heapq.heappush(self._heap, (encoded.error, -encoded.when[0], encoded.camera, bare))
         self._bytes += bare.size
         while len(self._heap) > self._most or self._bytes > HELD:
@@ -324,6 +338,7 @@ class Recorder:
             {camera.prefix + path: values for path, values in numbers},
             {camera.prefix + path: state for path, state in states.items()},
             tuple((note, level) for note in result.notes),
+            {camera.prefix + path: text for path, text in _rates_in_words(result, camera.layout)},
             error,
         )
 
@@ -348,6 +363,8 @@ class Recorder:
             self._rows[below + f"/results/{name}", columns.texts].add(when, text)
         for path, numbers in encoded.numbers.items():
             self._numbers[path, columns.numbers].add(when, numbers)
+        for path, text in encoded.texts.items():
+            self._numbers[path, columns.texts].add(when, text)
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
         if put_aside:
@@ -438,8 +455,8 @@ class Recorder:
         """Raise a `RecordingError`, caused by an ENOSPC, if the disk is full or nearly full."""
         if self._room() < self._rows.size:
             raise RecordingError(
-                f"{self.path}: cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must "
-                "stay free)"
+                f"cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must stay free)",
+                where=self.path,
             ) from _failure(errno.ENOSPC)
 
     def _room(self) -> float:
@@ -545,7 +562,9 @@ class Recorder:
 
     def _incomplete(self) -> RecordingError:
         refusal = self._refusal() or _failure(errno.EIO)
-        error = RecordingError(f"{self.path}: cannot be written any further: {refusal.strerror}")
+        error = RecordingError(
+            f"cannot be written any further: {refusal.strerror}", where=self.path
+        )
         error.__cause__ = refusal
         return error
 

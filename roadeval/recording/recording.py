@@ -72,14 +72,14 @@ class Recording:
         if text is None:
             lacking = f"holds no run, or its {self._file.below + at.LAYOUT} was dropped"
             ended = "the recording ends before its first frame"
-            raise RecordingError(f"{self.path}: {lacking if self._file.indexed else ended}")
+            raise RecordingError(lacking if self._file.indexed else ended, where=self.path)
         with name_damage(self.path, at.LAYOUT):
             version = read_json(text).get("properties", {}).get("version")
             if number is None and version == VERSION:  # Rerun's filter drops the properties
                 number = at.FORMAT
             if number != at.FORMAT:
                 sentence = another_format(version, later=(number or 0) > at.FORMAT)
-                raise RecordingError(f"{self.path}: {sentence}")
+                raise RecordingError(sentence, where=self.path)
             self.layout = Layout.from_json(text)
 
     @property
@@ -105,8 +105,10 @@ class Recording:
                 shown = {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
             if not self._file.span(at.CAMERA).holds_all(shown):
                 raise RecordingError(
-                    f"{self.path}: lacks images of frames that it lists: it is a part, as `rerun "
-                    "rrd split` makes it; give the whole recording"
+                    "lacks images of frames that it lists: it is a part, as `rerun rrd split` "
+                    "makes it",
+                    where=self.path,
+                    remedy="give the whole recording",
                 )
             return shown
         stamps: dict[int, int] = {}
@@ -214,10 +216,12 @@ class Recording:
     def _array(self, path: str, frame: int) -> Cells:
         if path not in self._codecs:
             paths = ", ".join(sorted(self._codecs))
-            raise RecordingError(f"{self.path}: there is no {path}; there are {paths}")
+            raise RecordingError(
+                f"there is no {path}", where=self.path, remedy=f"there are {paths}"
+            )
         codec = self._codecs[path]
         with name_damage(self.path, f"{path} on frame {frame}"):
             payload = self._file.image(path, codec.component, frame)
             if payload is None:
-                raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
+                raise RecordingError(f"{path} has nothing on frame {frame}", where=self.path)
             return codec.decode(payload)

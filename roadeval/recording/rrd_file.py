@@ -108,7 +108,9 @@ class RrdFile:
         ]
         if len(spans) < len(messages) and all(first == -inf for first, *_ in spans):
             raise RecordingError(
-                f"{path}: its timeline {FRAME} was dropped; give the recording as it was made"
+                f"its timeline {FRAME} was dropped",
+                where=path,
+                remedy="give the recording as it was made",
             )
         for _, _, message in sorted(spans, key=itemgetter(0, 1)):
             self.messages[message.path].append(message)
@@ -248,7 +250,9 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
         with path.open("rb") as file, name_damage(path, "its index"):
             if file.read(len(_MAGIC)) != _MAGIC:
                 raise RecordingError(
-                    f"{path}: not a recording (.rrd); 'roadeval replay' makes one of a log"
+                    "not a recording (.rrd)",
+                    where=path,
+                    remedy="'roadeval replay' makes one of a log",
                 )
             indexed_stores = _read_index(file)
             stores = _scan(file) if indexed_stores is None else indexed_stores
@@ -264,11 +268,11 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
                 elif fields[1] == _RECORDING:
                     made_by = application
     except FileNotFoundError as error:
-        raise RecordingError(f"{path}: no such recording") from error
+        raise RecordingError("no such recording", where=path) from error
     except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}") from error
+        raise RecordingError(str(error.strerror), where=path) from error
     if not recordings:
-        raise RecordingError(f"{path}: a recording by {made_by}, not by {APPLICATION}")
+        raise RecordingError(f"a recording by {made_by}, not by {APPLICATION}", where=path)
     layouts = {
         store: Counter(message.path for message in messages if message.path.endswith(LAYOUT))
         for store, messages in recordings.items()
@@ -277,8 +281,9 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
     count = sum(max(layouts[store].values()) for store in runs)
     if count > 1:
         raise RecordingError(
-            f"{path}: holds {count} recordings, or parts of one, as `rerun rrd merge` joins them; "
-            "give them one by one"
+            f"holds {count} recordings, or parts of one, as `rerun rrd merge` joins them",
+            where=path,
+            remedy="give them one by one",
         )
     return recordings[(runs or [*recordings])[0]], indexed_stores is not None
 

@@ -49,6 +49,8 @@ _PICTURE, _HEADER = 100, 50
 """Shares of a row's width: each picture, and at least its header."""
 _ROWS: Final = 2
 """Most variants that have a row: with more every picture would be too small."""
+_UNIT: Final = "0.1 is 10 %"
+"""The unit of curves: Rerun 0.41 shows numbers as they are logged, and rates are fractions."""
 _ABREAST: Final = 3
 """Cameras side by side."""
 _OUTCOMES: Final = 4
@@ -116,7 +118,7 @@ def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
         pictures.append(view)
         variants = layout.variants[:_ROWS] if layout.has_truth else ()
         paths += [f"{prefix}/metrics/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
-    curves = [plot(f"{TESTED} as a fraction, by camera", paths)] if paths else []
+    curves = [plot(f"{TESTED} by camera ({_UNIT})", paths)] if paths else []
     below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
     grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
     return rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras")
@@ -196,7 +198,10 @@ def overview(layout: Layout) -> BlueprintPart:
     pictures += [outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]]
     return rrb.Vertical(
         rrb.Horizontal(*pictures, document(at.GUIDE, "What you see")),
-        *(_row(name, cells, columns, aside.get(name)) for name, cells in rows.items()),
+        *(
+            _row(name, cells, columns, aside.get(name), has_truth=layout.has_truth)
+            for name, cells in rows.items()
+        ),
         rrb.Horizontal(*_curves(layout), *([] if aside else [_events()])),
         row_shares=[_TOP, *[_ROW] * len(rows), _BOTTOM],
         name="Overview",
@@ -220,7 +225,12 @@ def _cells(variant: VariantLayout) -> list[Cell]:
 
 
 def _row(
-    variant: str, cells: Sequence[Cell], columns: int, aside: BlueprintPart | None
+    variant: str,
+    cells: Sequence[Cell],
+    columns: int,
+    aside: BlueprintPart | None,
+    *,
+    has_truth: bool,
 ) -> BlueprintPart:
     """Return a variant's row, filled from the right so that equal phases are aligned.
 
@@ -228,7 +238,9 @@ def _row(
     """
     # Titles must be short here: the layers' names.
     pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
-    header, space = document(f"/results/guide/{variant}"), _PICTURE * (columns - len(cells))
+    header, space = document(f"{at.GUIDE}/{variant}"), _PICTURE * (columns - len(cells))
+    if has_truth:
+        header = rrb.Vertical(header, document(f"{at.FRAME_RATES}/{variant}"), row_shares=[8, 5])
     start, shares = ([aside, header], [space, _HEADER]) if aside else ([header], [_HEADER + space])
     return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[_PICTURE] * len(cells)])
 
@@ -241,7 +253,7 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
     finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
     return [
         plot(
-            f"{rate} as a fraction: {SHORT[rate].in_words}",
+            f"{rate}: {SHORT[rate].in_words} ({_UNIT})",
             [f"/metrics/{final}/{rate}" for final in finals],
         )
         for rate in SHORT
@@ -344,7 +356,7 @@ _OUTCOME_COLOURS: Final[Mapping[str, Colour]] = {
     "N": colours.GREY,
 }
 _ERRORS: Final = """\
-**Errors:** *green* road found, *orange* non-road called road (FP), *purple* road missed (FN),
+**Errors:** *green* road found, *orange-red* non-road called road (FP), *pink* road missed (FN),
 *grey* ignored.
 """
 _ROW_GUIDE: Final = """\
@@ -536,9 +548,10 @@ def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
     for variant, name in zip(layout.variants, names, strict=True):
         rates = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
         # A heading would break the name in such a narrow column.
-        parts = [f"**{name}**", as_markdown(variant.title)]
-        parts += [f"{rate} {percent(rates[rate])} %" for rate in SHORT if rate in rates]
-        yield f"/results/guide/{variant.name}", [_markdown("\n\n".join(parts) + "\n")]
+        parts = [f"**{name}**  \n{as_markdown(variant.title)}"]
+        drive = [f"{rate} {percent(rates[rate])} %" for rate in SHORT if rate in rates]
+        parts += ["  \n".join(["Drive:", *drive])] if drive else []
+        yield f"{at.GUIDE}/{variant.name}", [_markdown("\n\n".join(parts) + "\n")]
 
 
 def _guide(drive: str, verdict: str, *parts: str) -> tuple[str, list[Any]]:

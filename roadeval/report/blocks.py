@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
-from roadeval.report.chart import Chart, legend
+from roadeval.report.chart import Chart, Look, legend
 from roadeval.report.drawing import place_chart, range_of_frames
 from roadeval.runtime.text import as_markdown, visible
 
@@ -126,8 +126,14 @@ class Cell(Block):
 
     text: str
     bold: bool = False
-    dot: str | None = None
-    """Colour of a dot before the text."""
+    """Whether it is the best of its column, or of its row."""
+    look: Look | None = None
+    """The look of its variant in charts, whose mark stands before the text."""
+
+    @property
+    def dot(self) -> str | None:
+        """The colour of the mark."""
+        return self.look.colour if self.look else None
 
 
 @dataclass(frozen=True)
@@ -148,6 +154,8 @@ class Table(Block):
     """The text above the table."""
     small: bool = False
     """Whether it is set in small type."""
+    name: str = ""
+    """A name by which the script of a page finds it."""
     find: str = ""
     """The label of a field on a page that searches words in a table of many rows."""
 

@@ -154,6 +154,8 @@ class Chart:
     """Ends of the axes; by default the ends of the numbers."""
     sums: int = 0
     """Number of the last names that sum up the others; a rule separates them."""
+    low: bool = False
+    """Whether it is a ribbon on a page, a few millimetres high."""
 
     @property
     def of_frames(self) -> bool:

@@ -26,7 +26,6 @@ from roadeval.report.blocks import (
     Heading,
     Report,
     Table,
-    TableOfContents,
     Text,
     blocks_as_markdown,
 )
@@ -72,7 +71,6 @@ def document(
             Heading("What changed"),
             *overview(comparison, judgements),
             *_warnings(comparison),
-            TableOfContents(depth=2),
             *_figures(comparison, over_drive),
             *_details(comparison, inspect),
         ],
@@ -145,7 +143,7 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
                             rate,
                             percent(row.base[rate]),
                             percent(row.new[rate]),
-                            Cell(points(change.mean), bold=row.final and first),
+                            points(change.mean),
                             marked_interval(change),
                         ]
                     )
@@ -212,7 +210,9 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         yield from _plot(comparison)
         yield from changed_drives(comparison)
     if comparison.regions:
-        legend = correction(row.difference for row in comparison.regions)
+        changes = [row.difference for row in comparison.regions]
+        why = sentences.why_unsure(changes)
+        legend = correction(changes) or f"{why[:1].upper()}{why[1:]}."
         yield Heading("Where it is better, and where worse", 2)
         if rows := [row for row in comparison.regions if not row.difference.is_zero]:
             columns: Columns = {
@@ -231,7 +231,7 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
             "stamp": lambda row: timestamp(row.stamp_ns),
             "ERR base": lambda row: percent(row.base),
             "new": lambda row: percent(row.new),
-            "difference": lambda row: Cell(points(row.change), bold=True),
+            "difference": lambda row: points(row.change),
         }
         if inspect:
             columns[_COMMAND] = lambda row: inspect(row.result, row.frame)
@@ -243,9 +243,9 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
     for (result, variant), changes in _by_mask(comparison).items():
         if rows := [row for row in changes if row.changed]:
             shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
-            title = f"{variant} of {result}" if len(comparison.results) > 2 else variant
-            title = f"{title} changed"
-            if result == variant:
+            of = f" of {result}" if len(comparison.results) > 2 else ""
+            title = f"{variant}{of} changed"
+            if result == variant:  # variants of one result
                 title = f"{variant} differs from {comparison.results[0].label}"
             yield Heading(f"Drives on which {title}{shown}, the surest first", 2)
             columns: Columns = {
@@ -264,7 +264,7 @@ def _change(ends: Callable[[Any], str]) -> Columns:
     cells: tuple[Callable[[Any], Cell | str], ...] = (
         lambda row: percent(row.base),
         lambda row: percent(row.new),
-        lambda row: Cell(points(row.difference.mean), bold=True),
+        lambda row: points(row.difference.mean),
         ends,
     )
     return dict(zip(CHANGE, cells, strict=True))

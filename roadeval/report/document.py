@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any, Final
@@ -18,10 +19,9 @@ ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
 Section = Callable[[Any], Iterable[Block]]
 SCORED: Final = (
-    *(drive.over_drive, drive.filter_effect, drive.regions, ground.on_the_ground),
-    *(drive.stages, drive.thresholds),
+    *(drive.filter_effect, drive.regions, ground.on_the_ground, drive.stages, drive.thresholds),
 )
-"""The sections of a drive with truth; a drive without truth has a section on its masks."""
+"""The sections of a drive with truth; without truth there is one on its masks."""
 RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
 """The sections of several cameras of a drive."""
 
@@ -34,7 +34,7 @@ def document(findings: Findings | FleetFolder) -> Report:
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
     # Frames fill pages, so they come last.
-    scored = SCORED if findings.totals else (drive.masks,)
+    scored = (drive.over_drive, *SCORED) if findings.totals else (drive.masks,)
     gallery = (frames.worst_frames,) if findings.totals or findings.worst else ()
     return _compose(findings, *scored, provenance.section, *gallery)
 
@@ -52,8 +52,12 @@ def page_document(
         return _compose(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
-    scored = SCORED if findings.totals else (drive.masks,)
-    return _compose(findings, lambda _: frames.browser(browsed), *scored, provenance.section)
+    if browsed and browsed.film:  # which shows more
+        findings = replace(findings, thumbnails=())
+    parts = (drive.masks,)
+    if findings.totals:
+        parts = (partial(drive.over_drive, heading=False), *SCORED)
+    return _compose(findings, lambda _: frames.browser(browsed), *parts, provenance.section)
 
 
 def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:

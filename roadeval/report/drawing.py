@@ -19,6 +19,8 @@ from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
 """Most marks along a line: a line with more points has none."""
+ROOM: Final = 0.06
+"""Share of an axis behind its last tick: half of a number of three digits on a telephone."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -64,6 +66,12 @@ def _number_ticks(span: AxisRange) -> list[Tick]:
         (span.percent(tick), f"{tick:g}".replace("-", "\N{MINUS SIGN}"))
         for tick in ticks(span, _Y_TICKS)
     ]
+
+
+def _with_room(span: AxisRange) -> AxisRange:
+    """Return a range with room at its end for the last tick's number, which is centred there."""
+    end = ticks(span, _Y_TICKS)[-1] + ROOM * (span.high - span.low)
+    return AxisRange(span.low, max(span.high, end))
 
 
 def range_of_frames(charts: Iterable[Chart]) -> AxisRange:
@@ -153,7 +161,9 @@ class PlacedChart:
 def place_chart(chart: Chart, frames: AxisRange | None = None) -> PlacedChart:
     """Return a chart with its places; ``frames`` is the range of a chart along the drive."""
     y = AxisRange(*chart.y_range) if chart.y_range else _range_of_values(chart)
-    numbers, is_rows = _number_ticks(y), chart.kind is ChartKind.MARKS
+    if is_rows := chart.kind is ChartKind.MARKS:
+        y = _with_room(y)
+    numbers = _number_ticks(y)
     x, x_ticks = (y, numbers) if is_rows else _positions(chart, frames)
     level, band = chart.level, None
     if level and math.isfinite(level.low) and math.isfinite(level.high):
@@ -182,7 +192,7 @@ def _positions(chart: Chart, frames: AxisRange | None) -> tuple[AxisRange, list[
         return x, [(x.percent(t), f"{t:.0f}") for t in ticks(x, _X_TICKS) if t == int(t)]
     if chart.across:
         numbers = [number for series in chart.series for number in series.x]
-        x = AxisRange(*(chart.x_range or (min(numbers), max(numbers))))
+        x = _with_room(AxisRange(*(chart.x_range or (min(numbers), max(numbers)))))
         return x, _number_ticks(x)
     x = AxisRange(-0.3, len(chart.names) - 0.7)
     return x, [(x.percent(position), name) for position, name in enumerate(chart.names)]

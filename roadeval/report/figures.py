@@ -10,11 +10,13 @@ import base64
 from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.image import FigureImage
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from matplotlib.transforms import Bbox, TransformedBbox
 
@@ -22,22 +24,37 @@ from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, Rgb, as_plain
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import finals, values_of
 from roadeval.report.chart import FAINT, thin
-from roadeval.report.charts.standard import over_windows
+from roadeval.report.charts.standard import describe_points, over_windows, short_end
 from roadeval.report.images import ExampleFrame, encode_jpeg, pictures_of
-from roadeval.report.pdf.typeset import typeset_figure
+from roadeval.report.pdf.typeset import typeset_figure, write_file
 from roadeval.runtime.text import elide, visible
 from roadeval.runtime.threads import map_ordered
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+
+    from roadeval.report.chart import Chart
 
 DPI: Final = 200
 WIDTH: Final = 8
 """Inches across a figure."""
+EDGE: Final = 0.1
+AXIS: Final = 0.85
+FOOT: Final = 0.45
+GAP_OF_AXES: Final = 0.15
+"""Inches at the edges of a figure, left of its axes, below them, and between two of them."""
+NARROW: Final = 5
+"""Inches from which on a figure has room for letters of full size everywhere."""
+HANDLE: Final = 2.6
+"""Length of a line in a legend, in its letters' size."""
 LETTERS: Final = 9
 SMALL: Final = 8
 """Points of labels and legends, and of the ticks' labels."""
 INK: Final = "#222222"
+SHORT: Final = "#E6E6E6"
+"""The shade behind a last point that is the mean of fewer frames."""
+FileKind = Literal["png", "pdf", "svg"]
 RC: Final[dict[str, Any]] = {
     "font.family": "DejaVu Sans",
     "font.size": LETTERS,
@@ -71,40 +88,46 @@ def write_figures(
     windows: pd.DataFrame,
     examples: Sequence[ExampleFrame],
     camera: str = "",
+    *,
+    width: float = WIDTH,
+    titled: bool = True,
+    kinds: Sequence[FileKind] = ("png", "pdf"),
 ) -> list[Path]:
-    """Write every figure that has something to draw as PNG and PDF; return the files.
+    """Write every figure that has something to draw in these kinds of files; return the files.
 
     The folder is made if it is not there. ``windows`` are the rows of ``windows.csv``, of any
     number of variants, or no rows without truth; ``examples`` are a few frames, for figure 2;
-    ``camera`` is the name of a camera of a rig, for titles and the files' names. An OSError if the
-    folder cannot be written to; a `ReportError` if the system's folder for temporary files cannot
-    be.
+    ``camera`` is the name of a camera of a rig, for titles and the files' names. Figures are
+    ``width`` inches across. An OSError if the folder cannot be made; a `ReportError` if a file, or
+    the system's folder for temporary files, cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     drive = f"{drive}, {camera}" if camera else drive
     ending = f"-{as_plain(camera)}" if camera else ""
+    name = drive if titled else ""
 
     def draw() -> Iterator[tuple[str, bytes]]:
         with mpl.rc_context(RC):  # type: ignore[arg-type]
             if examples:
-                yield f"fig2_masks{ending}", as_svg(road_masks(drive, examples))
+                yield f"fig2_masks{ending}", as_svg(road_masks(name, examples, width))
             if len(windows):
-                yield f"fig3a_error_rate{ending}", as_svg(error_rate(drive, windows))
-                yield f"fig3b_fp_fn_rate{ending}", as_svg(fp_fn_rate(drive, windows))
+                yield f"fig3a_error_rate{ending}", as_svg(error_rate(name, windows, width))
+                yield f"fig3b_fp_fn_rate{ending}", as_svg(fp_fn_rate(name, windows, width))
 
     def write(named_svg: tuple[str, bytes]) -> list[Path]:
         name, svg = named_svg
-        files = {
-            folder / f"{name}.png": typeset_figure(svg, "png", DPI),
-            folder / f"{name}.pdf": typeset_figure(svg, "pdf"),
-        }
+        files = {folder / f"{name}.{kind}": _content(svg, kind) for kind in kinds}
         for path, content in files.items():
-            path.write_bytes(content)
+            write_file(path, content)
         return list(files)
 
     # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
     # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.
     return [path for paths in map_ordered(write, draw(), 1) for path in paths]
+
+
+def _content(svg: bytes, kind: FileKind) -> bytes:
+    return svg if kind == "svg" else typeset_figure(svg, kind, DPI if kind == "png" else None)
 
 
 def as_svg(figure: Figure) -> bytes:
@@ -134,114 +157,169 @@ _LONGEST: Final = 80
 """Letters of a variant's name that fit in a line of the legend."""
 
 
-def error_rate(drive: str, windows: pd.DataFrame) -> Figure:
-    """Draw figure 3a of the paper: the error rate over the drive, in rows of ten frames."""
-    return _over_drive(f"Error rate on {drive}", windows, {TESTED: "Error rate (ERR)"})
+def error_rate(drive: str, windows: pd.DataFrame, width: float = WIDTH) -> Figure:
+    """Draw figure 3a of the paper: the error rate over the drive, in rows of ten frames.
+
+    Without the name of a ``drive`` a figure has no title.
+    """
+    title = f"Error rate on {drive}" if drive else ""
+    return _over_drive(title, windows, {TESTED: "ERR: wrong pixels"}, width)
 
 
-def fp_fn_rate(drive: str, windows: pd.DataFrame) -> Figure:
+def fp_fn_rate(drive: str, windows: pd.DataFrame, width: float = WIDTH) -> Figure:
     """Draw figure 3b of the paper: both kinds of error over the drive, in rows of ten frames."""
     rates = {
         "FPR": "False positives (FPR)\nnon-road called road",
         "FNR": "False negatives (FNR)\nroad not found",
     }
-    return _over_drive(f"False positive and false negative rate on {drive}", windows, rates)
+    title = f"False positive and false negative rate on {drive}" if drive else ""
+    return _over_drive(title, windows, rates, width)
 
 
-def _over_drive(title: str, windows: pd.DataFrame, rates: Mapping[str, str]) -> Figure:
+def _over_drive(
+    title: str, windows: pd.DataFrame, rates: Mapping[str, str], width: float
+) -> Figure:
     """Draw the rates of every variant's final mask over the drive, one rate below the other."""
     charts = over_windows(windows, [*rates])
-    figure = Figure(figsize=(WIDTH, 1.9 + 2 * len(charts)), layout="constrained")
-    figure.suptitle(visible(title), x=0.012, ha="left", size=11, weight="bold", color=INK)
-    axes = figure.subplots(len(charts), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, chart, label in zip(axes, charts, rates.values(), strict=True):
+    head = []
+    if title:
+        stages = ", ".join(values_of(finals(windows), "stage"))
+        about = f"Final mask ({stages}); {describe_points(windows, CROWDED)}; lower is better."
+        head = _head(title, about, width - AXIS - EDGE)
+    short = short_end(windows, CROWDED)
+    size, words = (SMALL, {}) if width < NARROW else (LETTERS, _LABELS)
+    names = [words.get(series.name, series.name) for series in charts[0].series]
+    names += [f"mean of {short[0]}"] if short else []
+    labels = [elide(name, _LONGEST) for name in names]
+    longest = size * (0.57 * max(map(len, labels)) + HANDLE + 2)
+    room = 72 * (width - AXIS - EDGE) + 1.2 * size
+    columns = min(max(int(room // longest), 1), 3)
+    rows = -(-len(labels) // columns)
+    height, top = min(2.0, 0.55 * width), EDGE + _height_of(head) + 0.2 * rows
+    total = top + (height + GAP_OF_AXES) * len(charts) + FOOT
+    figure = Figure(figsize=(width, total))
+    _write_head(figure, head, AXIS)
+    for place, (chart, label) in enumerate(zip(charts, rates.values(), strict=True)):
+        bottom = total - top - (place + 1) * height - place * GAP_OF_AXES
+        box = AXIS / width, bottom / total, 1 - (AXIS + EDGE) / width, height / total
+        ax = figure.add_axes(box, sharex=figure.axes[0] if place else None)
         ax.set_ylabel(label)
-        for series in reversed(chart.series):
-            thinned, look = thin(series, CROWDED), series.look
-            ax.plot(
-                thinned.x,
-                thinned.y,
-                color=look.colour,
-                linestyle=_DASHES[look.dash],
-                linewidth=1.8,
-                marker=_MARKS[look.mark],
-                markerfacecolor="white" if look.hollow else look.colour,
-                markersize=5,
-                markevery=-(-len(thinned.x) // MARKED),
-                clip_on=False,
-                label=series.name,
-            )
-        highest = max([y for series in chart.series for _, y in series.points()], default=None)
-        if highest is None:
-            ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
-        ax.set_ylim(0, max(1.08 * (highest or 0), 0.5))
-        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
-    axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
+        ax.yaxis.set_label_coords(-0.5 / (width - AXIS - EDGE), 0.5)
+        ax.tick_params(labelbottom=chart is charts[-1])
+        _draw_rate(ax, chart)
+        if short:
+            ax.axvspan(*short[1:], color=SHORT, lw=0)
+    axes = figure.axes
+    axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=int(1.2 * width) + 1, integer=True))
     axes[-1].set_xlabel("frame")
-    lines, variants = (entries[::-1] for entries in axes[0].get_legend_handles_labels())
-    labels = [elide(_LABELS.get(variant, variant), _LONGEST) for variant in variants]
-    columns = 100 // (max(map(len, labels)) + 10)
+    keys: list[Any] = axes[0].get_lines()[::-1] + ([Patch(color=SHORT)] if short else [])
+    # Matplotlib fills the columns of a legend one after the other; people read rows.
+    in_rows = [p for column in range(columns) for p in range(column, len(labels), columns)]
     axes[0].legend(
-        lines,
-        labels,
-        title=_subtitle(windows),
-        title_fontproperties={"size": 8.5},
+        [keys[place] for place in in_rows],
+        [labels[place] for place in in_rows],
         alignment="left",
         loc="lower left",
         bbox_to_anchor=(0, 1),
         borderaxespad=0.2,
         borderpad=0,
-        ncols=min(max(columns, 1), 3),
-        handlelength=3.4,
-    ).get_title().set_color(FAINT)
-    figure.align_ylabels(axes)
+        ncols=columns,
+        fontsize=size,
+        handlelength=HANDLE,
+        columnspacing=1.2,
+    )
     return figure
 
 
-def _subtitle(windows: pd.DataFrame) -> str:
-    stages = ", ".join(values_of(finals(windows), "stage"))
-    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // CROWDED)
-    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
-    return f"Final mask ({stages}); each point is the mean of {point}; lower is better"
+def _draw_rate(ax: Axes, chart: Chart) -> None:
+    """Draw a chart's series, the first one on top."""
+    for series in reversed(chart.series):
+        thinned, look = thin(series, CROWDED), series.look
+        ax.plot(
+            thinned.x,
+            thinned.y,
+            color=look.colour,
+            linestyle=_DASHES[look.dash],
+            linewidth=1.8,
+            marker=_MARKS[look.mark],
+            markerfacecolor="white" if look.hollow else look.colour,
+            markersize=5,
+            markevery=-(-len(thinned.x) // MARKED),
+            clip_on=False,
+        )
+    highest = max([y for series in chart.series for _, y in series.points()], default=None)
+    if highest is None:
+        ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
+    ax.set_ylim(0, max(1.08 * (highest or 0), 0.5))
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
+
+
+HeadLine = tuple[str, float, dict[str, Any]]
+"""A line above a figure, its height in inches and its look."""
+
+
+def _head(title: str, about: str, width: float) -> list[HeadLine]:
+    """Return the lines of a title and of the text below it, ``width`` inches across."""
+    bold = {"size": 11, "weight": "bold", "color": INK, "va": "top"}
+    faint = {"size": 8.5, "color": FAINT, "va": "top"}
+    lines = [(line, 0.22, bold) for line in wrap(visible(title), int(9 * width))]
+    return lines + [(line, 0.17, faint) for line in wrap(about, int(14 * width))]
+
+
+def _height_of(head: Sequence[HeadLine]) -> float:
+    return sum(height for _, height, _ in head)
+
+
+def _write_head(figure: Figure, head: Sequence[HeadLine], left: float) -> None:
+    """Write lines at the top of a figure, ``left`` inches from its edge."""
+    (width, height), down = figure.get_size_inches(), EDGE
+    for line, step, look in head:
+        figure.text(left / width, 1 - down / height, line, **look)
+        down += step
 
 
 LEFT: Final = 0.28
-TOP: Final = 0.78
-"""Inches left of the pictures, for the frames' numbers, and above them, for the titles."""
+"""Inches left of the pictures, for the frames' numbers."""
+NAMES: Final = 0.2
+"""Inches above the pictures, for their names."""
 GAP: Final = 0.05
 """Inches between pictures, and between a picture and its name."""
 
 
-def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
+def road_masks(drive: str, examples: Sequence[ExampleFrame], width: float = WIDTH) -> Figure:
     """Draw figure 2 of the paper: the image, and over it each variant's mask, and the truth."""
     rows = [*pictures_of([example.small() for example in examples])]
-    height, width = rows[0]["camera image"].shape[:2]
-    column_width = (WIDTH - LEFT) / len(rows[0])
-    row_height = (column_width - GAP) * height / width + GAP
-    figure_height = TOP + row_height * len(rows) + GAP
-    figure = Figure(figsize=(WIDTH, figure_height))
+    pixels_down, pixels_across = rows[0]["camera image"].shape[:2]
+    column_width = (width - LEFT) / len(rows[0])
+    row_height = (column_width - GAP) * pixels_down / pixels_across + GAP
+    head = _head(f"Road masks on {drive}", _legend(examples), width - LEFT) if drive else []
+    top_of_rows = GAP + _height_of(head) + NAMES + (GAP if head else 0)
+    figure_height = top_of_rows + row_height * len(rows) + GAP
+    figure = Figure(figsize=(width, figure_height))
+    _write_head(figure, head, LEFT)
+    size = LETTERS if width >= NARROW else 7
 
     def write(x: float, y: float, text: str, **look: Any) -> None:
-        figure.text(x / WIDTH, 1 - y / figure_height, text, **look)
+        figure.text(x / width, 1 - y / figure_height, text, **look)
 
-    title = visible(f"Road masks on {drive}")
-    write(0.1, 0.1, title, size=11, weight="bold", color=INK, va="top")
-    write(0.1, 0.32, _legend(examples), size=8.5, color=FAINT, va="top")
     for row, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
-        top, bottom = TOP + row * row_height, TOP + (row + 1) * row_height - GAP
+        top = top_of_rows + row * row_height
+        bottom = top + row_height - GAP
         name = f"frame {example.frame}" if row_height > 0.7 else str(example.frame)
         beside = {"rotation": 90, "ha": "right", "va": "center", "size": SMALL, "color": FAINT}
         write(LEFT - GAP, (top + bottom) / 2, name, **beside)
         for column, (title, picture) in enumerate(pictures.items()):
             left, right = LEFT + column * column_width, LEFT + (column + 1) * column_width - GAP
             low, high = 1 - bottom / figure_height, 1 - top / figure_height
-            box = Bbox.from_extents(left / WIDTH, low, right / WIDTH, high)
-            FigurePicture(figure, picture, box)
+            FigurePicture(
+                figure, picture, Bbox.from_extents(left / width, low, right / width, high)
+            )
             if row == 0:
-                name = elide(title, max(int(11 * column_width), 3))
-                above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
-                write((left + right) / 2, TOP - GAP, name, **above)
+                name = "camera" if column == 0 and width < NARROW else title
+                name = elide(name, max(int(120 / size * column_width), 3))
+                above = {"size": size, "color": INK, "ha": "center", "va": "bottom"}
+                write((left + right) / 2, top_of_rows - GAP, name, **above)
     return figure
 
 

@@ -8,7 +8,6 @@ from typing import Final
 
 from roadeval.data.words import DASH, MINUS, defined, listing, number, percent, points, short_names
 from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT, SHORT_OVERLAP, TESTED
-from roadeval.evaluation.tables import final_stages
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.captions import caption
 from roadeval.report.chart import looks
@@ -20,8 +19,8 @@ OTHERS: Final = tuple(rate for rate in SHORT if rate != TESTED)
 
 
 def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
-    """Return a variant's name, or a text, with the dot of its colour among ``names``."""
-    return Cell(text or name, dot=looks(names)[name].colour)
+    """Return a variant's name, or a text, with its mark in charts among ``names``."""
+    return Cell(text or name, look=looks(names)[name])
 
 
 def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
@@ -66,6 +65,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         ["final mask", *columns],
         [[variant_cell(name, names), *row] for name, row in zip(names, rows, strict=True)],
         small=not of_fleet,
+        name="rates",
         caption=" ".join(sentences),
     )
 
@@ -74,19 +74,17 @@ def stages_table(
     totals: Totals, changes: Mapping[tuple[str, str], Sequence[float]] | None = None
 ) -> Table:
     """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
-    finals = final_stages((name, stage) for name, stages in totals.items() for stage in stages)
     rows: list[list[Cell | str]] = []
     breaks = []
     for variant, stages in totals.items():
         breaks.append(len(rows))
         for place, (stage, total) in enumerate(stages.items()):
-            bold = stage == finals[variant]
             rows.append(
                 [
                     "" if place else variant_cell(variant, [*totals]),
                     stage,
                     number(total["frames"]),
-                    *(Cell(percent(total.get(n)), bold=bold and n == TESTED) for n in FULL),
+                    *(percent(total.get(n)) for n in FULL),
                     *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_OVERLAP)),
                 ]
             )
@@ -124,7 +122,7 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
             [
                 variant_cell(effect.variant, names, words),
                 *([] if brief else ends),
-                Cell(points(change.mean), bold=True),
+                points(change.mean),
                 marked_interval(change),
                 *(points(effect.rates[rate].mean) for rate in OTHERS),
                 *([] if brief else won),
@@ -149,7 +147,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
             variant_cell(variant, [*totals]),
             stage,
             percent(curve["AP"]),
-            Cell(percent(curve["MaxF"]), bold=True),
+            percent(curve["MaxF"]),
             f"{curve['threshold']:.5g}" if defined(curve["threshold"]) else DASH,
             percent(curve.get("ECE")),
             percent(totals[variant][stage].get("pooled_F1")),
@@ -185,6 +183,6 @@ def cameras_table(facts: Facts) -> Table:
     return Table(
         ["camera", "frames", *masks, *titles],
         rows,
-        caption=caption("cameras"),
+        caption=f"{caption('cameras')} {caption('bold')}",
         small=True,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import groupby
 from typing import Any, Final
 from xml.etree import ElementTree
@@ -12,7 +12,8 @@ from roadeval.data.words import listing, percent, plain_points, setting
 from roadeval.evaluation.comparison.compare import FALSE, Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
-from roadeval.results.sentences import is_significant
+from roadeval.evaluation.stats.difference import Difference
+from roadeval.results.sentences import is_significant, is_sure
 from roadeval.results.verdict import describe_change
 from roadeval.runtime.text import visible
 
@@ -98,8 +99,26 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
             parts.append(f"{word} everywhere")
         elif names:
             parts.append(f"{word} ({'; '.join(names)})")
-    changes = ", ".join(parts) or "no change is sure in any"
+    changes = ", ".join(parts) or why_unsure(row.difference for row in rows)
     return f"{_mask_name(result, variant)} by region: {changes}"
+
+
+def why_unsure(differences: Iterable[Difference]) -> str:
+    """Return why none of the differences of several regions is sure; empty if one is.
+
+    >>> change = Difference(0.08, 0.001, 0.16, 0.04, 0.95, "frames", 90, p_holm=0.5, comparisons=12)
+    >>> why_unsure([change])
+    'each change may be chance, as 12 regions are compared'
+    """
+    changes = list(differences)
+    if any(map(is_significant, changes)):
+        return ""
+    if reasons := {change.none_because for change in changes if change.low is None} - {""}:
+        return f"no interval, as {listing(sorted(reasons))}"
+    alone = [change for change in changes if is_sure(replace(change, p_holm=None))]
+    counts = [change.comparisons for change in alone if change.comparisons]
+    family = f", as {max(counts)} regions are compared" if counts else ""
+    return f"each change may be chance{family}"
 
 
 def _mask_name(result: str, variant: str) -> str:
@@ -131,20 +150,20 @@ def changed_drives(comparison: Comparison) -> list[str]:
 
 
 def describe_judgement(judgement: Judgement) -> str:
-    """Return a sentence on the value that a condition limits, and whether it holds."""
+    """Return a sentence on the value that a condition limits."""
     condition, drives = judgement.condition, judgement.drives
     if judgement.holds is None:
         return judgement.why
     rate = f"{condition.stage}.{condition.variant}.{condition.rate} of {judgement.result}"
-    holds = "holds" if judgement.holds else "does not hold"
+    limit = f"(limit: {condition.text})"
     after, over = f"{percent(judgement.after)} %", f" over {drives} drives" if drives > 1 else ""
     if not condition.is_change:
-        return f"{rate} is {after}{over}: {condition.text} {holds}"
-    change = f"{plain_points(judgement.value)} pp"
+        return f"{rate} is {after}{over} {limit}"
+    change = f"{plain_points(judgement.value)} points"
     if condition.surely:
         change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
     before = f"{percent(judgement.before)} %"
-    return f"{rate} changed by {change}{over} ({before} to {after}): {condition.text} {holds}"
+    return f"{rate} changed by {change}{over}, from {before} to {after} {limit}"
 
 
 def headline(holds: Sequence[bool | None]) -> str:

@@ -83,12 +83,10 @@ def correction(differences: Iterable[Difference]) -> str:
     if not any(map(is_significant, marked)):
         return ""
     if counts == [1]:
-        return f"{MARK} excludes 0; it is the only one, so nothing is corrected."
-    many = f"{counts[0]} differences" if len(counts) == 1 else "differences"
-    families = "" if len(counts) == 1 else f" against one base ({' and '.join(map(str, counts))})"
+        return f"{MARK} the interval does not contain 0."
     return (
-        f"{MARK} significant after Holm's correction for the {many} of ERR of final "
-        f"masks{families}; others are not corrected."
+        f"{MARK} not chance, even though several are compared (Holm's correction). Rows without "
+        f"{MARK} may be chance."
     )
 
 

@@ -10,6 +10,7 @@ import codecs
 import json
 import os
 import re
+from collections.abc import Iterable
 from typing import Final
 from unicodedata import category
 
@@ -21,6 +22,8 @@ _URL: Final = re.compile(
 )
 """A URL in a text; also one that passed for a path and lost a slash."""
 
+LIKENESS: Final = 0.7
+"""How alike a mistyped name and the one that was meant are at least, as `difflib` counts."""
 UNENCODABLE: Final = "roadeval.visible"
 """Name of an error handler for streams: it escapes letters that the encoding lacks."""
 
@@ -62,6 +65,22 @@ def visible(text: str) -> str:
 def visible_lines(text: str) -> str:
     """Return the lines of a text, as a document of JSON or TOML, each made `visible`."""
     return "\n".join(map(visible, text.split("\n")))
+
+
+def likely(name: str, names: Iterable[str]) -> str:
+    """Return a question about the names that a mistyped one was probably meant to be; or nothing.
+
+    >>> likely("--out", ["--net", "--output"]), likely("robst", ["paper", "robust"])
+    ('did you mean --output? ', 'did you mean robust? ')
+    >>> likely("mine", ["filtered"])
+    ''
+    """
+    from difflib import get_close_matches
+
+    names = [*names]
+    begun = sorted(other for other in names if other.startswith(name))
+    meant = begun[:3] or get_close_matches(name, names, 1, LIKENESS)
+    return f"did you mean {' or '.join(meant)}? " if meant and name else ""
 
 
 def elide(name: str, letters: int) -> str:

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Role, Truth
+from roadeval.data.words import listing
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score.frame import BlindPrior
 from roadeval.logs.frames import LoggedFrame
@@ -38,7 +39,9 @@ class TrainingError(RoadevalError):
     """Frames from which nothing can be learnt."""
 
 
-WITHOUT_TRAINING: Final = Sentence("give {training.model}, or run what learns nothing with {only}")
+WITHOUT_TRAINING: Final = Sentence(
+    "give {training.model}, or score only masks or networks with {only}"
+)
 
 
 def fit(
@@ -252,7 +255,7 @@ def from_log(
     if not learning:
         return fit((), pipelines, settings), Schedule(picks=picks)
     if not settings.frames:
-        problem = f"is 0, and {', '.join(learning)} must learn"
+        problem = f"must be at least 1, because {listing(learning)} must learn"
         raise TrainingError(problem, setting="training.frames", remedy=WITHOUT_TRAINING)
     held, schedule = HeldFrames(on_frame), Schedule()
     if labelled and picks:
@@ -346,9 +349,10 @@ def choose_frames(
     beside = frozenset(number for place, number in enumerate(numbers) if place in near)
     left = [number for number in numbers if number not in beside | trained | lost.keys()]
     if with_truth and trained and not left:
+        used = f" ({len(trained)}) or left out as its gap ({len(beside)})" if beside else ""
         raise TrainingError(
-            f"the range has {len(numbers)} labelled frames, and training would take {len(trained)} "
-            f"of them and {len(beside)} more as a gap: none is left to evaluate",
+            f"all {len(numbers)} labelled frames in the range are used for training{used}, so none "
+            "is left to score",
             remedy=Sentence(
                 "set {training.frames} to {}, {}",
                 max(len(numbers) // (2 + 2 * gap), 1),

@@ -81,8 +81,9 @@ class Model:
         if variant not in self.settings:
             variants = ", ".join(sorted(self.settings))
             raise ModelError(
-                f"{path}: the model has no variant {variant} (it has {variants}); "
-                "train one with the same preset and variants"
+                f"the model has no variant {variant} (it has {variants})",
+                where=path,
+                remedy="train one with the same preset and variants",
             )
         # Through JSON, as in the file, where tuples and lists are the same.
         relevant = json.loads(json.dumps(pipeline.relevant_settings()))
@@ -93,14 +94,17 @@ class Model:
                 keys = [k for k in {**there, **here} if there.get(k) != here.get(k)]
                 differ = (f"{k} {there.get(k)} there, {here.get(k)} here" for k in keys)
                 raise ModelError(
-                    f"{path}: the model was made for other settings of {name} in variant "
-                    f"{variant} ({', '.join(differ)}); train one with the settings of this run"
+                    f"the model was made for other settings of {name} in variant {variant} "
+                    f"({', '.join(differ)})",
+                    where=path,
+                    remedy="train one with the settings of this run",
                 )
         for name in pipeline.learning_stages():
             if name not in self.parameters.get(variant, {}):
                 raise ModelError(
-                    f"{path}: the model file is incomplete: {name} of variant {variant} has "
-                    "learnt nothing; train it again"
+                    f"the model file is incomplete: {name} of variant {variant} has learnt nothing",
+                    where=path,
+                    remedy="train it again",
                 )
 
 
@@ -143,12 +147,12 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     """
     header, arrays = read_archive(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
+        raise ModelError("not a model file", where=path, remedy="make one with 'roadeval train'")
     if (version := header.get("version")) != VERSION:
         number = version if isinstance(version, int) else 0
         writer = header.get("roadeval") or WROTE.get(number)
         problem = another_format(writer, later=number > VERSION, remedy="train it again")
-        raise ModelError(f"{path}: {problem}")
+        raise ModelError(problem, where=path)
     try:
         return make_model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
@@ -156,7 +160,9 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
         if isinstance(error, ValidationError):
             first = error.errors(include_url=False)[0]
             reason = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"
-        raise ModelError(f"{path}: a damaged model file: {reason}; train it again") from error
+        raise ModelError(
+            f"a damaged model file: {reason}", where=path, remedy="train it again"
+        ) from error
 
 
 def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
@@ -190,9 +196,11 @@ def read_archive(path: Path) -> tuple[Any, Arrays]:
         return json.loads(arrays.pop("header").tobytes()), arrays
     except Exception as error:  # four libraries read an archive, each with errors of its own
         if isinstance(error, OSError) and error.strerror:
-            raise ModelError(f"{path}: cannot read the model: {error.strerror}") from error
+            raise ModelError(f"cannot read the model: {error.strerror}", where=path) from error
         raise ModelError(
-            f"{path}: not a model file, or a damaged one; make one with 'roadeval train'"
+            "not a model file, or a damaged one",
+            where=path,
+            remedy="make one with 'roadeval train'",
         ) from error
 
 

@@ -239,6 +239,7 @@ def test_every_option_s_words_are_a_setting_s_value(job):
         ("{masks} my-net: bad", "--masks my-net: bad"),
         (Setting("masks.my-net.first"), "`first` in the file of --masks my-net=FILE.toml"),
         (Setting("topics.masks.net"), "--mask-topic net"),
+        (Setting("net.road"), "`road` in the file of --net NAME=FILE.toml"),
     ],
 )
 def test_settings_in_a_sentence_are_named_by_their_flags(text, shown):

@@ -1,12 +1,15 @@
 """Wrong usage, which no file can change: exit code 2; help and version at once."""
 
 import os
+import shlex
 import subprocess
 import sys
 
 import pytest
+import typer
 
 from roadeval.cli.app import app, main
+from roadeval.cli.options import FIRST, FLAGS
 from roadeval.version import VERSION
 
 WRONG = {
@@ -43,9 +46,26 @@ def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
     assert shown.err.count("\n") == 1
 
 
-def test_a_mistyped_command_is_guessed(capsys):
-    assert main(["rplay"]) == 2
-    assert "Did you mean 'replay'?" in capsys.readouterr().err
+def test_a_width_without_a_unit_is_wrong_usage(capsys):
+    assert main(["report", "a.rrd", "--figures", "f", "--width", "8.5"]) == 2
+    assert "8.5 is no width of a figure; write it as 8.5cm" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        ("rplay", "Did you mean 'replay'? see"),
+        ("--hlep", "did you mean --help? see"),
+        ("replay a.mcap --out b", "did you mean --output? see"),
+        ("replay a.mcap --trian-frames 3", "did you mean --train-frames? see"),
+        ("replay a.mcap --preset robst", "did you mean robust? choose"),
+        ("replay a.mcap --only unfilterd", "did you mean unfiltered? choose"),
+        ("replay a.mcap --xyzzy", "No such option: --xyzzy; see"),
+    ],
+)
+def test_what_is_mistyped_is_guessed_by_likeness(words, meant, capsys):
+    assert main(words.split()) == 2
+    assert meant in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -104,26 +124,88 @@ HEAVY = ["cv2", "matplotlib", "mcap", "numpy", "pandas", "pyarrow", "rerun", "sk
 def test_the_list_of_commands_tells_each_in_a_line(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     main(["--help"])
-    listed = capsys.readouterr().out.split("Commands:\n")[1].splitlines()
+    listed = capsys.readouterr().out.split("Commands:\n")[1].split("\n\n")[0].splitlines()
     assert [line.split()[0] for line in listed] == COMMANDS
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_of_80_columns(command, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+def help_lines(command, capsys):
     assert main([command, "--help"]) == 0
-    shown = capsys.readouterr()
-    assert f"Usage: roadeval {command}" in shown.out
-    assert max(len(line) for line in shown.out.splitlines()) <= 80
-    assert shown.err == ""
+    return capsys.readouterr().out.splitlines()
 
 
-def test_no_command_at_all_shows_the_help_as_wrong_usage(capsys):
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_of_80_columns_begins_with_an_example_and_ends_with_exit_codes(
+    command, capsys, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = help_lines(command, capsys)
+    assert lines[0].startswith(f"Usage: roadeval {command} [OPTIONS]")
+    assert lines[4].startswith(f"  roadeval {command} ")
+    assert lines[-2].startswith("  Exit codes: 0 done;")
+    assert max(map(len, lines)) <= 80
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_options_of_an_example_exist(command):
+    of_command = typer.main.get_command(app).commands[command]
+    for example in of_command.help.split("\n\n")[1].splitlines():
+        _, _, *words = shlex.split(example.partition(" > ")[0] if command == "config" else example)
+        of_command.make_context(command, words)
+
+
+def test_the_first_screen_of_a_replays_help_has_what_most_people_need(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    screen = "\n".join(help_lines("replay", capsys)[:24])
+    assert all(f"  {FLAGS[setting]}"[-9:] in screen for setting in FIRST)
+
+
+def test_help_has_the_width_of_the_terminal(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    assert 140 < max(map(len, help_lines("replay", capsys))) <= 160
+    monkeypatch.delenv("COLUMNS")
+    monkeypatch.setattr("sys.__stdout__", None)
+    assert max(map(len, help_lines("replay", capsys))) <= 80
+
+
+def test_no_command_at_all_shows_on_one_screen_what_to_type_first_as_wrong_usage(
+    capsys, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "80")
     assert main([]) == 2
     shown = capsys.readouterr()
-    assert "Commands:" in shown.err
+    lines = shown.err.splitlines()
     assert shown.out == ""
+    assert len(lines) <= 23
+    assert max(map(len, lines)) <= 80
+    assert [line.split()[1] for line in lines[3:6]] == ["demo", "replay", "report"]
+    assert lines[-2].startswith("Exit codes: ")
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("roadeval rep", ["replay", "report"]),
+        ("roadeval replay --labe", ["--labelled"]),
+        ("roadeval replay --preset r", ["robust"]),
+        ("roadeval replay ./d", []),
+    ],
+)
+def test_a_shell_completes_commands_options_and_presets(words, completed, capsys, monkeypatch):
+    monkeypatch.setenv("_ROADEVAL_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    assert main([]) == 0
+    assert capsys.readouterr().out.split() == completed
+
+
+def test_completion_is_installed_for_the_current_shell(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr("shellingham.detect_shell", lambda: ("fish", "/bin/fish"))
+    assert main(["--install-completion"]) == 0
+    file = tmp_path / ".config/fish/completions/roadeval.fish"
+    assert "_ROADEVAL_COMPLETE=complete_fish" in file.read_text()
+    assert str(file) in capsys.readouterr().out
 
 
 def test_version_goes_to_stdout(capsys):

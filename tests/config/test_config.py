@@ -32,8 +32,14 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
     ("text", "message"),
     [
         ("[shadow]\nring_width = 0", r"shadow\.ring_width: .* \(given: 0\)"),
-        ("[shadow]\nring = 1", r"shadow\.ring: there is no such setting; choose .*ring_width"),
-        ("[shadows]\nring_width = 1", r"\[shadows\] is no table here; choose .*shadow"),
+        (
+            "[shadow]\nring = 1",
+            r"shadow\.ring: there is no such setting; did you mean ring_width\? choose",
+        ),
+        (
+            "[shadows]\nring_width = 1",
+            r"\[shadows\] is no table here; did you mean shadow\? choose .*shadow",
+        ),
         ("shadow = 3", r"shadow: must be a table"),
         ("[svm]\ngamma = nan", r"svm\.gamma: .*finite"),
         ("[svm]\nkernel = 'poly'", r"svm\.kernel: .*'rbf' or 'linear'"),
@@ -179,7 +185,10 @@ def test_what_holds_for_the_whole_run_is_refused_of_a_drive():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"path": "a", "thresold": 1}, "there is no such setting; choose decide, first"),
+        (
+            {"path": "a", "thresold": 1},
+            r"there is no such setting; did you mean threshold\? choose decide, first",
+        ),
         ({"path": "a", "threshold": 2}, "must be at most 1"),
         ({"path": "a", "threshold": 0.5, "labels": {"road": [3]}}, "threshold is for confidence"),
         ({"path": "a", "images": "b", "first": 1}, "with images labels are paired by name"),

@@ -10,7 +10,6 @@ import pytest
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
 from tests.e2e.test_fleet import Here
 from tests.fixtures.browser import browser, watched  # noqa: F401
-from tests.fixtures.figures import drawn
 from tests.fixtures.make import make
 
 
@@ -37,18 +36,16 @@ def at_home(once):
 
     def do(folder: Path) -> Run:
         drive = make("drives/street.mcap", folder)
-        with drawn():
-            return here("replay", drive, *CLASSES, "--jobs", 2, "--json", cwd=folder)
+        return here("replay", drive, *CLASSES, "--jobs", 2, "--json", cwd=folder)
 
     return once("home", do)
 
 
 def of_drive(name: str, *words: Any) -> Callable[[Path], Run]:
-    """Return what replays one of the small drives, and draws the paper's figures of it."""
+    """Return what replays one of the small drives."""
 
     def do(folder: Path) -> Run:
-        with drawn():
-            return replay(folder, make(f"drives/{name}.mcap", folder), *words).run
+        return replay(folder, make(f"drives/{name}.mcap", folder), *words).run
 
     return do
 

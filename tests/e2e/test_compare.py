@@ -59,8 +59,8 @@ def test_ci_gets_a_case_a_condition_as_junit(demo, worse, tmp_path):
     assert exceeded.get("classname") == LIMIT[1]
     message = exceeded.find("failure").get("message")
     assert message in run.stderr
-    assert "> +0.5pp holds" in message
-    assert limited.find("system-out").text.endswith("> 99% does not hold")
+    assert "(limit: post.filtered.ERR > +0.5pp)" in message
+    assert limited.find("system-out").text.endswith("> 99%)")
 
 
 def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tmp_path):

@@ -131,7 +131,7 @@ def test_a_comparison_of_a_fleet_names_the_drives_that_failed(ran, limit, code):
     condition = ["--fail-if", f"post.filtered.ERR {limit}"] if limit else []
     done = here("compare", ran.folder, *condition)
     assert done.returncode == code, done.stderr
-    assert "lost: f: 1 of 3 drives failed, no number counts b" in done.stderr
+    assert "lost: f: 1 of 3 drives failed and is in no number: b" in done.stderr
     assert "1 of 3 drives failed" in compare(ran.folder).content["warnings"][0]
 
 

@@ -15,11 +15,15 @@ import pandas as pd
 import pytest
 from pypdf import PdfReader
 
-from roadeval.jobs.results import frames
+from roadeval import Recording
+from roadeval.data import ERRORS
+from roadeval.jobs.results import page
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs.writing.writer import LogWriter
-from tests.e2e.commands import here, roadeval
+from roadeval.report.images import LayerImage, paint
+from tests.e2e.commands import DEMO, here, roadeval
 from tests.fixtures.browser import missing, violations, wait_until
+from tests.networks.making import red_network
 from tests.results.fleet.making import fleet_of
 
 if reason := missing():
@@ -58,6 +62,24 @@ def shown(tab, selector):
     return [each.text_content() for each in tab.locator(selector).all() if each.is_visible()]
 
 
+@pytest.fixture
+def table(tab):
+    """The page of the demo in a tab, with the table of all frames unfolded."""
+    tab.locator(".all summary").click()
+    return tab
+
+
+def drag(tab, chart, start, end):
+    """Drag over a part of a chart, from and to shares of its width."""
+    chart.scroll_into_view_if_needed()
+    tab.wait_for_timeout(200)
+    box = chart.bounding_box()
+    tab.mouse.move(box["x"] + box["width"] * start, box["y"] + box["height"] / 2)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + box["width"] * end, box["y"] + box["height"] / 2, steps=5)
+    tab.mouse.up()
+
+
 def frame(tab):
     """The number of the frame that is looked at."""
     return int(re.match(r"Frame (\d+)", tab.locator(".where").inner_text())[1])
@@ -66,8 +88,8 @@ def frame(tab):
 # --- A page of one drive --------------------------------------------------------------------------
 
 
-def test_a_page_is_one_file_of_at_most_10_mb_and_asks_for_nothing(drive, watched):
-    assert drive.stat().st_size < 10_000_000
+def test_a_page_is_one_file_of_at_most_6_2_mb_and_asks_for_nothing(drive, watched):
+    assert drive.stat().st_size < 6_200_000
     assert {each.name for each in drive.parent.iterdir()} == {"page.html", "drive.rrd"}
     seen = watched(drive.as_uri())
     assert seen.elsewhere == []
@@ -75,7 +97,8 @@ def test_a_page_is_one_file_of_at_most_10_mb_and_asks_for_nothing(drive, watched
     assert seen.complaints == []
 
 
-def test_every_evaluated_frame_is_in_the_table_with_its_rates(tab, demo):
+def test_every_evaluated_frame_is_in_the_table_with_its_rates(table, demo):
+    tab = table
     rows = tab.locator(".frames tbody tr")
     assert rows.count() == demo.summary["frames"]["evaluated"]
     columns = tab.locator(".frames thead th[data-rate=ERR]").all_inner_texts()
@@ -85,7 +108,8 @@ def test_every_evaluated_frame_is_in_the_table_with_its_rates(tab, demo):
     assert sum(values) / len(values) == pytest.approx(100 * mean, abs=0.01)
 
 
-def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(tab):
+def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(table):
+    tab = table
     title = tab.locator(".frames thead th[data-rate=ERR] button").first
     read = "rows => rows.map(row => Number(row.cells[2].textContent))"
     title.click()
@@ -96,16 +120,18 @@ def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(tab):
     assert tab.locator(".frames th[aria-sort]").get_attribute("aria-sort") == "ascending"
 
 
-def test_frames_are_filtered_by_variant_rate_and_condition(tab):
+def test_frames_are_filtered_by_variant_rate_and_condition(table):
+    tab = table
     everything = tab.locator(".frames tbody tr").count()
-    tab.locator(".choice select").first.select_option("unfiltered")
+    tab.select_option("[name=focus]", "unfiltered")
+    tab.select_option("[name=beside]", label="none")
     assert shown(tab, ".frames thead th[data-variant]") == ["unfiltered"] * 3
     tab.fill("[name=least]", "20")
     rates = [float(text) for text in shown(tab, ".frames tbody td:nth-child(4)")]
     assert 0 < len(rates) < everything
     assert min(rates) >= 20
     tab.click(".filters [type=reset]")
-    tab.locator(".choice select").first.select_option("")
+    tab.select_option("[name=beside]", label="all variants")
     wait_until(tab, "document.querySelectorAll('.frames tr[hidden]').length === 0")
     tab.select_option("[name=condition]", label="the filter helps")
     notes = shown(tab, ".frames tbody td:last-child")
@@ -115,19 +141,20 @@ def test_frames_are_filtered_by_variant_rate_and_condition(tab):
     assert all(float(with_) < float(without) for with_, without in zip(*errors, strict=True))
 
 
-def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(tab):
-    errors = tab.locator(".frames tr.pictured").evaluate_all(
-        "rows => rows.map(row => [Number(row.cells[2].textContent), Number(row.dataset.frame)])"
+def test_the_worst_frame_is_seen_first_and_arrow_keys_go_to_every_frame(tab, demo):
+    rows = pd.read_csv(demo.reports / "frames.csv").query(
+        "variant == 'filtered' and stage == 'post'"
     )
-    first = frame(tab)
-    assert first == max(errors)[1]
+    worst = int(rows.loc[rows["ERR"].idxmax(), "frame"])
+    assert frame(tab) == worst
     tab.keyboard.press("ArrowRight")
-    after = frame(tab)
-    assert after > first
+    assert frame(tab) == worst + 1
     tab.keyboard.press("ArrowLeft")
-    assert frame(tab) == first
-    assert len(shown(tab, ".strip .two")) == 1
-    assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(first)
+    assert frame(tab) == worst
+    assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(worst)
+    cells = tab.locator(".about tbody tr").first.locator("td").all_inner_texts()
+    row = rows.set_index("frame").loc[worst]
+    assert cells == [f"{100 * row[rate]:.2f}" for rate in ("ERR", "FPR", "FNR")]
 
 
 def test_the_link_below_the_verdict_leads_to_the_worst_frame(tab, demo):
@@ -139,39 +166,24 @@ def test_the_link_below_the_verdict_leads_to_the_worst_frame(tab, demo):
     )
     worst = int(rows.loc[rows["ERR"].idxmax(), "frame"])
     assert frame(tab) == worst
-    assert tab.locator(".strip:visible").get_attribute("data-frame") == str(worst)
     command = tab.locator("#summary .links code").inner_text()
     assert command == f"roadeval inspect drive.rrd --frame {worst}"
 
 
-def test_a_frame_without_pictures_offers_the_nearest_and_its_note(tab):
-    rows = tab.locator(".frames tbody tr")
-    has = {int(row.get_attribute("data-frame")): row for row in rows.all()}
-    pictured = {number for number, row in has.items() if row.get_attribute("class") == "pictured"}
-    lacking = [number for number in has if number not in pictured]
-    number = max(lacking, key=lambda each: min(abs(each - other) for other in pictured))
-    has[number].click()
-    assert tab.locator(".stage").is_hidden()
-    note = has[number].get_attribute("data-note")
-    assert note is None or note in tab.locator(".absent").inner_text()
-    tab.locator(".absent button").click()
-    distance = min(abs(number - other) for other in pictured)
-    assert abs(frame(tab) - number) == distance
-    assert tab.locator(".stage").is_visible()
-
-
-def test_the_address_names_the_frame_and_back_goes_to_the_last_one(tab, drive, watched):
+def test_the_address_names_the_frame_and_back_goes_to_the_last_one(table, drive, watched):
+    tab = table
     first = frame(tab)
     assert "#" not in tab.url
     one, two = (
-        int(each.get_attribute("data-frame")) for each in tab.locator("tr.pictured").all()[1:3]
+        int(row.get_attribute("data-frame")) for row in tab.locator("tr.pictured").all()[1:3]
     )
     for number in (one, two):
         tab.locator(f".frames tr[data-frame='{number}'] a").click()
         assert tab.url.endswith(f"#frame-{number}")
+    tab.locator(".where").click()
     tab.keyboard.press("ArrowRight")
     assert tab.url.endswith(f"#frame-{frame(tab)}")
-    assert frame(tab) > two
+    assert frame(tab) == two + 1
     tab.go_back()
     assert frame(tab) == one
     tab.go_back()
@@ -179,11 +191,148 @@ def test_the_address_names_the_frame_and_back_goes_to_the_last_one(tab, drive, w
     assert frame(watched(f"{drive.as_uri()}#frame-{two}").tab) == two
 
 
+def picture_of(tab, canvas):
+    """A picture of the film, ``(H, W, 3)``."""
+    shape, pixels = tab.locator(f".views .{canvas}").evaluate(
+        "c => [[c.height, c.width, 4], "
+        "[...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]]"
+    )
+    return np.array(pixels, int).reshape(shape)[..., :3]
+
+
+def test_the_film_shows_the_errors_of_every_frame(tab, demo):
+    recording = Recording(demo.recording)
+
+    def distance(picture, variant, number):
+        """How far a picture is from a frame's errors over its image, as a report paints them."""
+        errors = recording.layer(variant, ERRORS.name, number)
+        painted = paint(LayerImage("", recording.image(number), ERRORS, errors))
+        size = picture.shape[1::-1]
+        return np.abs(cv2.resize(painted, size, interpolation=cv2.INTER_AREA) - picture).mean()
+
+    for number in (80, 81, 43):
+        tab.evaluate(f"location.hash = '#frame-{number}'")
+        wait_until(tab, f"document.querySelector('.where').textContent.includes('{number} ')")
+        tab.wait_for_timeout(400)
+        for canvas, variant in (("above", "filtered"), ("below", "unfiltered")):
+            picture = picture_of(tab, canvas)
+            assert distance(picture, variant, number) < 6
+            assert distance(picture, variant, number + 3) > 12
+
+
+def test_it_plays_to_the_end_of_the_chosen_part_and_stops(tab):
+    drag(tab, tab.locator(".ribbons .area").first, 0.3, 0.45)
+    while tab.locator(".previous").is_enabled():
+        tab.locator(".previous").click()
+    first = frame(tab)
+    tab.locator(".play").click()
+    wait_until(tab, "document.querySelector('.play').textContent === 'Pause'")
+    wait_until(tab, "document.querySelector('.play').textContent === 'Play'")
+    last = int(re.search(r"range=\d+-(\d+)", tab.url)[1])
+    assert first < frame(tab) == last
+
+
+def test_a_part_of_the_drive_narrows_tables_charts_and_the_verdict(table, demo, watched):
+    tab = table
+    whole = tab.locator(".verdict").inner_text()
+    drag(tab, tab.locator(".ribbons .area").first, 0.2, 0.5)
+    low, high = map(int, re.search(r"range=(\d+)-(\d+)", tab.url).groups())
+    rows = pd.read_csv(demo.reports / "frames.csv").query("stage == 'post'")
+    rows = rows[rows["frame"].between(low, high)]
+    means = rows.groupby("variant")[["ERR", "FPR", "FNR"]].mean() * 100
+    for row in tab.locator("table[data-name=rates] tbody tr").all():
+        name, *cells = row.locator("th, td").all_inner_texts()
+        assert cells[:3] == [f"{value:.2f}" for value in means.loc[name]]
+    sentence = tab.locator(".verdict").inner_text()
+    assert sentence.startswith(f"Frames {low} to {high} ({rows['frame'].nunique()})")
+    assert all(f"{value:.1f} %" in sentence for value in means.loc["filtered"])
+    assert low <= frame(tab) <= high
+    numbers = [int(text) for text in shown(tab, ".frames tbody th")]
+    assert (min(numbers), max(numbers)) == (low, high)
+    views = tab.locator(".along .area").evaluate_all(
+        "all => all.map(a => a.getAttribute('viewBox'))"
+    )
+    assert len(views) > 4
+    assert len(set(views)) == 1
+    again = watched(tab.url).tab
+    assert again.locator(".verdict").inner_text() == sentence
+    tab.locator(".whole:visible").first.click()
+    assert tab.locator(".verdict").inner_text() == whole
+    assert "range" not in tab.url
+
+
+def test_the_focus_changes_verdict_pictures_and_frames_and_stands_in_the_address(
+    tab, demo, watched
+):
+    tab.select_option("[name=focus]", "unfiltered")
+    rows = pd.read_csv(demo.reports / "frames.csv").query(
+        "variant == 'unfiltered' and stage == 'post'"
+    )
+    worst = int(rows.loc[rows["ERR"].idxmax(), "frame"])
+    assert tab.locator(".verdict").inner_text().startswith("unfiltered: 12.0 % of the pixels")
+    assert tab.locator("#summary .links a").inner_text().startswith(f"Worst frame: {worst}, where")
+    assert frame(tab) == worst
+    assert "Worst frames of unfiltered" in tab.locator(".about .worst").inner_text()
+    assert tab.locator("select.left").input_value() == "unfiltered: errors"
+    assert tab.url.endswith(f"#frame-{worst}&focus=unfiltered")
+    again = watched(tab.url).tab
+    assert again.locator(".verdict").inner_text() == tab.locator(".verdict").inner_text()
+    assert again.locator("[name=focus]").input_value() == "unfiltered"
+
+
+def test_a_click_on_a_ribbon_shows_its_frame_and_nothing_jumps(tab):
+    ribbon = tab.locator(".ribbons .area").nth(1)
+    ribbon.scroll_into_view_if_needed()
+    before = tab.evaluate("scrollY")
+    box = ribbon.bounding_box()
+    tab.mouse.move(box["x"] + box["width"] * 0.4, box["y"] + box["height"] / 2)
+    number = int(re.match(r"frame (\d+)", tab.locator(".tip:visible").inner_text())[1])
+    tab.mouse.down()
+    tab.mouse.up()
+    assert frame(tab) == number
+    assert tab.evaluate("scrollY") == before
+    ribbon.focus()
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("Enter")
+    assert frame(tab) == number + 1
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory):
+    """A replay of a network with probabilities of every size, the arguments of it, and its page."""
+    folder = tmp_path_factory.mktemp("graded")
+    red_network(folder / "red.onnx")
+    words = ["--net", f"mine={folder / 'red.onnx'}", "--only", "mine", "--max-frames", "12"]
+    run = here("replay", DEMO, *words, "--save", folder / "out.rrd", "--reports", folder / "out")
+    assert run.returncode == 0, run.stderr
+    run = here("report", folder / "out.rrd", "-o", folder / "page.html")
+    assert run.returncode == 0, run.stderr
+    return folder
+
+
+def test_a_moved_threshold_gives_the_rates_of_a_replay_at_it(graded, watched, tmp_path):
+    tab = watched((graded / "page.html").as_uri()).tab
+    slider, told = tab.locator(".threshold input"), tab.locator(".threshold p")
+    before, picture = told.inner_text(), picture_of(tab, "above")
+    slider.fill("40")
+    assert told.inner_text() != before
+    assert (picture_of(tab, "above") != picture).any()
+    assert "threshold=40" in tab.url
+    (tmp_path / "red.toml").write_text(tab.locator(".threshold code").inner_text())
+    words = ["--net", f"mine={tmp_path / 'red.toml'}", "--only", "mine", "--max-frames", "12"]
+    run = here("replay", DEMO, *words, "--record", "none", "--reports", tmp_path / "out", "--json")
+    assert run.returncode == 0, run.stderr
+    rates = json.loads(run.stdout)["totals"]["mine"]["net"]
+    stated = [f"{rate} {100 * rates[f'pooled_{rate}']:.2f} %" for rate in ("ERR", "FPR", "FNR")]
+    assert told.inner_text() == f"All pixels of the drive: {', '.join(stated)}."
+    tab.click("text=As it is")
+    assert told.inner_text() == before
+
+
 def test_a_slider_lies_between_two_variants(tab):
     assert tab.locator("select.left").input_value() == "filtered: errors"
     assert tab.locator("select.right").input_value() == "unfiltered: errors"
     above, below = (tab.locator(f".views .{name}") for name in ("above", "below"))
-    assert above.get_attribute("src") != below.get_attribute("src")
     above.scroll_into_view_if_needed()
     box = above.bounding_box()
     tab.mouse.move(box["x"] + box["width"] / 2, box["y"] + 50)
@@ -194,17 +343,16 @@ def test_a_slider_lies_between_two_variants(tab):
     assert above.evaluate("each => each.style.clipPath").startswith("inset(0")
     tab.select_option("select.right", "camera")
     tab.keyboard.press("Escape")
-    assert "camera" in below.get_attribute("alt")
+    assert "camera" in below.get_attribute("aria-label")
     tab.locator(".where").click()
     tab.keyboard.press("ArrowRight")
     assert tab.locator("select.right").input_value() == "camera"
 
 
-def test_a_picture_enlarges_and_arrow_keys_go_on_inside(tab):
+def test_the_picture_enlarges_and_arrow_keys_go_on_inside(tab):
     first = frame(tab)
-    tab.locator(".strip:not([hidden]) .tile img").nth(1).click()
+    tab.locator(".views").click(position={"x": 30, "y": 30})
     assert tab.locator("dialog .views").is_visible()
-    assert tab.locator("dialog select.left").input_value() == "truth"
     tab.keyboard.press("ArrowRight")
     assert frame(tab) > first
     tab.keyboard.press("Escape")
@@ -212,64 +360,17 @@ def test_a_picture_enlarges_and_arrow_keys_go_on_inside(tab):
     assert tab.locator(".viewer .views").is_visible()
 
 
-def test_a_click_on_a_chart_shows_its_frame_and_the_pointer_its_values(tab):
-    for chart in (tab.locator(".browser .area").first, tab.locator("figure .along .area").last):
-        chart.scroll_into_view_if_needed()
-        box = chart.bounding_box()
-        tab.mouse.move(box["x"] + box["width"] * 0.4, box["y"] + box["height"] / 2)
-        tip = tab.locator(".tip:visible")
-        number = int(re.match(r"frame (\d+)", tip.inner_text())[1])
-        tab.mouse.down()
-        tab.mouse.up()
-        row = tab.locator(f".frames tr[data-frame='{number}']")
-        assert frame(tab) == number
-        assert row.get_attribute("aria-current") == "true"
-    assert tab.locator(".absent").is_visible() or tab.locator(".stage").is_visible()
-
-
-def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(tab):
-    everything = tab.locator(".frames tbody tr").count()
-    chart = tab.locator(".browser .area").first
-    chart.scroll_into_view_if_needed()
-    box = chart.bounding_box()
-    tab.mouse.move(box["x"] + box["width"] * 0.2, box["y"] + 20)
-    tab.mouse.down()
-    tab.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 20, steps=5)
-    tab.mouse.up()
-    views = tab.locator(".along .area").evaluate_all(
-        "all => all.map(a => a.getAttribute('viewBox'))"
-    )
-    assert len(views) > 4
-    assert len(set(views)) == 1
-    left, _, width, _ = map(float, views[0].split())
-    told = tab.locator(".browser .along").first.get_attribute("data-values")
-    first, last = json.loads(told)["x"]
-    low, size = (share * (last - first) / 100 for share in (left, width))
-    low += first
-    numbers = [
-        int(each.get_attribute("data-frame"))
-        for each in tab.locator(".frames tbody tr:not([hidden])").all()
-    ]
-    assert 0 < len(numbers) < everything
-    assert low <= min(numbers) <= max(numbers) <= low + size
-    tab.locator(".whole:visible").first.click()
-    assert tab.locator(".frames tbody tr:not([hidden])").count() == everything
-
-
-def test_two_variants_are_chosen_for_the_whole_page(tab):
-    one, other = tab.locator(".choice select").all()
-    assert other.is_disabled()
-    one.select_option("unfiltered")
-    other.select_option("blind")
+def test_a_variant_beside_the_focus_is_shown_alone_with_it(tab):
+    tab.select_option("[name=focus]", "unfiltered")
+    tab.select_option("[name=beside]", "blind")
     assert set(shown(tab, ".legend li")) & {"filtered", "unfiltered", "blind"} == {
         *("unfiltered", "blind")
     }
-    assert not [each for each in tab.locator("g[data-of=filtered]").all() if each.is_visible()]
+    assert not [part for part in tab.locator("g[data-of=filtered]").all() if part.is_visible()]
     assert shown(tab, "#summary tbody th") == ["unfiltered", "blind"]
-    assert tab.locator("select.left").input_value() == "unfiltered: errors"
     tab.locator(".rows").first.locator(".row").nth(2).hover()
     assert "\nfiltered" not in tab.locator(".tip:visible").inner_text()
-    one.select_option("")
+    tab.select_option("[name=beside]", label="all variants")
     assert shown(tab, "#summary tbody th") == ["filtered", "unfiltered", "blind"]
 
 
@@ -289,11 +390,11 @@ def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
 def test_without_a_script_everything_is_there(drive, watched):
     tab = watched(drive.as_uri(), java_script_enabled=False).tab
     assert len(shown(tab, ".strip h3")) > 5
+    assert shown(tab, ".ribbons .axis")
     outcomes = tab.locator(".strip > .pictures img")
     assert all(each.is_visible() for each in outcomes.all()[:20])
     tab.locator(".strip summary").first.click()
     assert tab.locator(".strip").first.locator("img").last.is_visible()
-    assert shown(tab, ".charts .axis")
     assert not shown(tab, ".filters, .tools, .stage, .find, .scripted")
 
 
@@ -324,16 +425,16 @@ def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
     assert run.returncode == 0, run.stderr
     seen = watched((tmp_path / "page.html").as_uri())
     assert seen.complaints == []
-    assert seen.tab.locator("select.left").input_value() == "filtered: post"
-    assert seen.tab.locator("select.right").input_value() == "unfiltered: post"
+    assert seen.tab.locator("select.left").input_value() == "filtered: mask"
+    assert seen.tab.locator("select.right").input_value() == "unfiltered: mask"
     first = frame(seen.tab)
     seen.tab.keyboard.press("ArrowRight")
     assert frame(seen.tab) > first
 
 
 def test_without_truth_the_frames_to_look_at_are_pictured_first(unlabelled, monkeypatch):
-    monkeypatch.setattr(frames, "PICTURED", 3)
-    strips = frames.strips_of(DriveResult(unlabelled.recording), 10**9)
+    monkeypatch.setattr(page, "PICTURED", 3)
+    strips = page.strips_of(DriveResult(unlabelled.recording), 10**9)
     look_at = unlabelled.summary["unlabelled"]["look_at"]
     assert [each.frame for each in strips] == sorted(look_at[:3])
 

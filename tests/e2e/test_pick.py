@@ -13,14 +13,19 @@ from PIL import Image
 import roadeval
 from roadeval.config.run import configure
 from roadeval.logs.log import open_log
-from roadeval.logs.truth.drawn import Proposal
 from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import Picks, Why
+from roadeval.logs.truth.shapes import Proposal
 from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 
 HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
-QUICK = 'preset = "robust"\n[trees]\ntrees = 15\n[training]\npixels_per_class = 50\n'
+QUICK = """
+preset = "robust"
+only = ["unfiltered"]
+trees.trees = 15
+training.pixels_per_class = 50
+"""
 """Some trees are enough: what is picked and counted is tested here, not how good it is."""
 
 
@@ -118,7 +123,7 @@ def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(lab
 
 def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
     words = ("--config", "patch.toml", "--record", "none")
-    (work / "patch.toml").write_text(f'{QUICK}source = "patch"\n')
+    (work / "patch.toml").write_text(f'{QUICK}training.source = "patch"\n')
     label(work / "to_label", truths)
     before, _ = scored(work, *words)
     label(work / "to_label", {stamp: 1 - (t == 1) for stamp, t in truths.items()}, Why.RANKED)
@@ -232,7 +237,9 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert stamps_of(Picks.read(work / "at_once"), Why.RANDOM) == stamps_of(after, Why.RANDOM)
 
 
-def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(work, truths):
+def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
+    work, truths, without_workers
+):
     shutil.copy(work / "street.mcap", work / "second.mcap")
     (work / "first.toml").write_text('topics.truth = ""\nframes.max_frames = 20\n' + QUICK)
     words = ("-n", 6, "-o", "both", "--config", "first.toml")

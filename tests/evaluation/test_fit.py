@@ -88,8 +88,10 @@ WRONG: dict[str, tuple[Callable[[Masks], Masks], Finding]] = {
 MOVES = [(3, 0), (-4, 0), (0, 5), (0, -3), (8, -6), (0, 12)]
 
 
-@pytest.mark.parametrize("name", WRONG)
-@pytest.mark.parametrize("method", ["exact", "holes"])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [*((name, "exact") for name in WRONG), ("2 late", "holes"), ("mirrored", "holes")],
+)
 def test_masks_that_do_not_fit_are_named(name: str, method: str) -> None:
     change, finding = WRONG[name]
     masks = rough(ROADS, holes=0.1) if method == "holes" else ROADS
@@ -112,8 +114,9 @@ def test_masks_computed_here_tell_that_truth_is_late_where_the_image_has_no_edge
     assert found(late(ROADS, 2), blank, ROADS) == [Finding(TRUTH, Misfit.LAG, frames=2)]
 
 
-@pytest.mark.parametrize(("right", "down"), MOVES)
-@pytest.mark.parametrize("holes", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("right", "down", "holes"), [*((*move, 0.1) for move in MOVES), (3, 0, 0.0), (0, 12, 0.0)]
+)
 def test_moved_masks_are_named_with_their_pixels(right: int, down: int, holes: float) -> None:
     (finding,) = found(ROADS, mine=moved(rough(ROADS, holes=holes), right, down))
     assert finding.misfit is Misfit.MOVED
@@ -121,8 +124,8 @@ def test_moved_masks_are_named_with_their_pixels(right: int, down: int, holes: f
     assert abs(finding.down - down) <= 1
 
 
-@pytest.mark.parametrize("grow", [-4, -2, 2, 4])
-@pytest.mark.parametrize(("right", "down"), [(0, 0), (2, 0), (4, 0), (0, 5), (0, -6), (-8, 6)])
+@pytest.mark.parametrize("grow", [-4, 2])
+@pytest.mark.parametrize(("right", "down"), [(0, 0), (4, 0), (0, -6), (-8, 6)])
 def test_masks_that_are_grown_and_moved_are_named_with_the_move_or_left_alone(
     grow: int, right: int, down: int
 ) -> None:

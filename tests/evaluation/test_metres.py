@@ -9,7 +9,7 @@ import pytest
 
 from roadeval.data import FrameMetres, Packed, TruthBits, histogram
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, RIGHT, STANCES, UNPLACED, Survey, plan_of
-from roadeval.evaluation.score.metres import MetreSums, differences_of, kitti, measure
+from roadeval.evaluation.score.metre_sums import MetreSums, differences_of, kitti, measure
 from roadeval.evaluation.score.thresholds import Curves
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import ground_of

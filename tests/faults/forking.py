@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Final
 
@@ -23,8 +24,12 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 class Forks:
     """The small process, which ends with the ``with`` statement."""
 
+    def __init__(self, *modules: str) -> None:
+        self._modules = modules
+        """Large modules that runs import: each fork of a process without them takes longer."""
+
     def __enter__(self) -> Forks:
-        command = [sys.executable, "-m", "tests.faults.forking"]
+        command = [sys.executable, "-m", "tests.faults.forking", *self._modules]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe)
         assert self._process.stdin
@@ -53,6 +58,8 @@ def serve() -> None:
     with tempfile.TemporaryDirectory() as folder:
         # Import here what a run needs: in a fork the imports would count as its steps.
         making.run(Path(folder), "first")
+        for module in sys.argv[1:]:
+            import_module(module)
     while True:
         try:
             work, hook = pickle.load(sys.stdin.buffer)

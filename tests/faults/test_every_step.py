@@ -20,6 +20,8 @@ pytestmark = pytest.mark.skipif(
 
 IN_PLACE = "in place"
 SITUATIONS = ["again", IN_PLACE, "first"]
+SOME = [pytest.param(3, id="some"), pytest.param(1, id="all", marks=pytest.mark.sweep)]
+"""From a step at which a run is killed to the next one."""
 
 
 @pytest.fixture(scope="module")
@@ -85,13 +87,14 @@ def check_next_run(place, before, whole):
     assert {path.name for path in place.iterdir()} == set(making.PLACES)
 
 
+@pytest.mark.parametrize("stride", SOME)
 def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
-    forks, again, whole, situation, tmp_path
+    forks, again, whole, tmp_path, stride
 ):
     old, new, after = making.outputs(again()), whole("new"), whole("next")
-    moving, code, number = 0, steps.KILLED, 0
+    moving, code, number = 0, steps.KILLED, 1 - stride
     while code == steps.KILLED:
-        number += 1
+        number += stride
         place = again()
         code = forks.run(partial(making.run, place, "new"), steps.KilledAt(number))
         found = making.outputs(place)
@@ -160,20 +163,23 @@ def files(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def test_the_resumed_result_is_that_of_one_go(tmp_path):
+@pytest.mark.parametrize(
+    "stride", [pytest.param(97, id="some"), pytest.param(13, id="more", marks=pytest.mark.sweep)]
+)
+def test_the_resumed_result_is_that_of_one_go(tmp_path, stride):
     logs = tmp_path / "logs"
     for number, name in enumerate("ab"):
         write(logs / f"{name}.mcap", 100 * number)
     run(logs, tmp_path / "whole")
     want = files(tmp_path / "whole"), tables(tmp_path / "whole")
     number, code = 1, steps.KILLED
-    with Forks() as forks:
+    with Forks("pandas", "scipy.stats", "roadeval.jobs.run.fleet") as forks:
         while code == steps.KILLED:
             folder = tmp_path / str(number)
             code = forks.run(partial(run, logs, folder), steps.KilledAt(number))
             again = forks.run(partial(run, logs, folder), steps.undisturbed)
             assert again == steps.DONE
             assert (files(folder), tables(folder)) == want, number
-            number += 41
+            number += stride
     assert code == steps.DONE
     assert number > 100

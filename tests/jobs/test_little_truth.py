@@ -85,7 +85,7 @@ def test_six_labels_that_must_train_are_refused_with_what_would_do(places, tmp_p
     with pytest.raises(TrainingError) as caught:
         replay(places, tmp_path, "6")
     said = str(caught.value)
-    assert "the range has 6 labelled frames, and training would take 6 of them" in said
+    assert "all 6 labelled frames in the range are used for training, so none is left" in said
     assert all(each in said for each in ("`training.frames` to 3", "`training.model`", "`only`"))
     done = replay(places, tmp_path, "6", training={"frames": 3})
     assert (done.summary["frames"]["trained_on"], done.summary["frames"]["evaluated"]) == (3, 3)
@@ -94,7 +94,7 @@ def test_six_labels_that_must_train_are_refused_with_what_would_do(places, tmp_p
 def test_no_frames_for_training_are_enough_for_what_learns_nothing(places, tmp_path):
     done = replay(places, tmp_path, "6", ("net",), training={"frames": 0})
     assert done.summary["frames"]["evaluated"] == 6
-    with pytest.raises(RoadevalError, match="filtered, unfiltered must learn") as caught:
+    with pytest.raises(RoadevalError, match="because filtered and unfiltered must learn") as caught:
         replay(places, tmp_path, "6", training={"frames": 0})
     assert caught.value.setting == "training.frames"
 

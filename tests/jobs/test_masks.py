@@ -177,7 +177,7 @@ def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, 
         ({"path": "other.mcap"}, "name a topic of it, as"),
         (
             {"path": "other.mcap:/no"},
-            "/no is not in the log; its image topics are: /seg",
+            "/no is not in the log; its label topics are: /seg",
         ),
         (
             {"path": "other.mcap:/seg", "images": "images"},

@@ -318,17 +318,33 @@ def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
     assert (refused.value.where, refused.value.setting) == ("mask.mcap", "labels.road")
 
 
+def split_without_its_second_file(folder):
+    """A folder of a split log; one of its files is no log."""
+    folder.mkdir()
+    write_log(folder / "split_0.mcap")
+    (folder / "split_1.mcap").write_bytes(b"no log")
+    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
+    return folder
+
+
 def test_what_is_lost_of_a_log_is_told(tmp_path):
-    split = tmp_path / "split"
-    split.mkdir()
-    write_log(split / "split_0.mcap")
-    (split / "split_1.mcap").write_bytes(b"no log")
-    (split / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
-    losses = train([split], tmp_path).losses
+    losses = train([split_without_its_second_file(tmp_path / "split")], tmp_path).losses
     assert [loss.partition(": ")[0] for loss in losses] == [
         "split_1.mcap",
         "/camera/image",
         "/truth/road",
+    ]
+
+
+def test_what_is_lost_of_several_logs_begins_with_the_name_of_one(tmp_path):
+    logs = write_log(tmp_path / "a.mcap", broken=0), split_without_its_second_file(tmp_path / "b")
+    losses = train(logs, tmp_path).losses
+    assert [loss.split(": ")[:2] for loss in losses] == [
+        ["a.mcap", "frame 0"],
+        ["a.mcap", "1 of 3 training frames could not be decoded"],
+        ["b", "split_1.mcap"],
+        ["b", "/camera/image"],
+        ["b", "/truth/road"],
     ]
 
 

@@ -78,13 +78,14 @@ def with_network(folder, **tables):
     return small(config.with_tuned(["mine"]))
 
 
-def small(config):
-    """The method and what is tuned of it alone, with small trees."""
+def small(config, methods=("mine",)):
+    """The methods and what is tuned of them alone, with small trees."""
     trees = {each.name: {**each.pipeline.as_dict(), "preset": each.preset} for each in config.extra}
     for own in trees.values():
         if "trees" in own:
             own["trees"] = {**own["trees"], **SMALL["trees"]}
-    return config.override({"variants": trees, "only": ["mine", "mine_tuned"]})
+    names = [name for method in methods for name in (method, f"{method}_tuned")]
+    return config.override({"variants": trees, "only": names})
 
 
 def replay(drive, config, to):
@@ -188,7 +189,7 @@ def test_the_lines_of_the_verdict_keep_their_promise(brought, folder, tmp_path):
 
     def replayed(lines):
         masks = {"mine": {**given, **tomllib.loads(lines)}} if brought == "masks" else {}
-        config = configure({**SMALL, "masks": masks, "output": {"record": "none"}})
+        config = configure({"masks": masks, "output": {"record": "none"}})
         if not masks:
             own.write_text(f'file = "{network}"\n{lines}')
             config = config.with_variants([network_variant("mine", str(own))])
@@ -285,23 +286,21 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
         assert err(rows, "mine_tuned") < err(rows, "mine") / 3
 
 
-@pytest.mark.parametrize("by", ["network", "masks", "files"])
-def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path, by):
+def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path):
+    """A network, masks of the log and confidences beside it, each with what is tuned of it."""
     drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(2)]
-    fleet = {"folds": 2}
-    if by == "network":
-        config = with_network(folder, fleet=fleet)
-    else:
-        masks = {"topics": {"masks": {"mine": "/net/mask"}}}
-        if by == "files":
-            masks = {"masks": {"mine": confidences(tmp_path / "shares")}}
-        config = small(configure({**SMALL, **masks, "fleet": fleet}).with_tuned(["mine"]))
+    beside = {"beside": confidences(tmp_path / "shares")}
+    topics, methods = {"masks": {"logged": "/net/mask"}}, ["mine", "logged", "beside"]
+    config = configure({**SMALL, "topics": topics, "masks": beside, "fleet": {"folds": 2}})
+    config = config.with_variants([network_variant("mine", str(folder / "red.onnx"))])
+    config = small(config.with_tuned(methods), methods)
     with ThreadPoolExecutor(1) as executor:
         roadeval.replay_fleet(drives, tmp_path / "out", config, executor=executor)
     scores = roadeval.Result(tmp_path / "out").scores.query("stage == 'post'")
     errs = scores.pivot_table(index="drive", columns="variant", values="ERR")
     assert len(errs) == 2
-    assert (errs.mine_tuned < errs.mine / 3).all()
+    for method in methods:
+        assert (errs[f"{method}_tuned"] < errs[method] / 3).all()
 
 
 def test_a_model_is_refused_with_another_network(folder, tmp_path):

@@ -1,7 +1,5 @@
 """Forty ways in which a network may end, all with the same road: where blue is below one half."""
 
-from types import SimpleNamespace
-
 import cv2
 import numpy as np
 import onnx
@@ -9,9 +7,11 @@ import pytest
 from onnx import TensorProto, helper
 from PIL import Image
 
-from roadeval.networks import NetSettings, Network, NetworkError, onnx_file
+from roadeval.networks import NetSettings, Network, NetworkError
 from roadeval.networks.network import fit_image
 from tests.networks.making import IMAGE, ROAD, SIZE, network, written
+
+pytestmark = pytest.mark.usefixtures("opened_here_alone")
 
 RNG = np.random.default_rng(3)
 EXPECTED = RNG.integers(0, 2, (SIZE[1], SIZE[0]), np.uint8)
@@ -109,13 +109,6 @@ def ended(path, ending, size=SIZE):
     kinds = {"ArgMax": TensorProto.INT64, "Greater": TensorProto.BOOL}
     kind = int(last.partition("to=")[2] or kinds.get(last.split()[0], FLOAT))
     return written(path, nodes, WEIGHTS, kind=kind, size=size)
-
-
-@pytest.fixture(autouse=True)
-def opened_here_alone(monkeypatch):
-    """Open no file in another process first: that takes most of the time."""
-    done = SimpleNamespace(run=lambda *_, **__: SimpleNamespace(returncode=0))
-    monkeypatch.setattr(onnx_file, "subprocess", done)
 
 
 def road_of(path, ending, frame=FRAME, **settings):

@@ -12,6 +12,8 @@ from roadeval.networks import NetSettings, Network, NetworkError
 from tests.networks.making import IMAGE as MADE
 from tests.networks.making import ROAD, SIZE, balanced, network, scores, without_end, written
 
+pytestmark = pytest.mark.usefixtures("opened_here_alone")
+
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
 """An image of the input's size."""
 FRAME = cv2.resize(IMAGE, (48, 30), interpolation=cv2.INTER_CUBIC)
@@ -226,7 +228,11 @@ def test_another_file_than_the_stated_one_is_refused(tmp_path):
 
 ASKED = {
     "a size that it does not take": ({}, {"size": (20, 20)}, "takes no input of 20x20"),
-    "which of several outputs": ({"spare": True}, {}, "`net.outputs`"),
+    "which of several outputs": (
+        {"spare": True},
+        {},
+        "name those that show road by `net.outputs`, with lines such as `file = ",
+    ),
     "an output that is not there": ({}, {"outputs": ("seg",)}, "has no output 'seg'"),
     "which of three classes": (
         {"classes": 3},

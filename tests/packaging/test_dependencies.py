@@ -62,6 +62,7 @@ def test_a_benchmark_finds_what_it_imports(module):
     import_module(module.removesuffix(".__init__"))
 
 
+@pytest.mark.sweep
 def test_the_loop_is_held_against_the_floor(monkeypatch, capsys):
     words = ["--drive", str(ROOT / "recordings/demo.mcap"), "--parts", "replay", "stages"]
     words += ["--sizes", "96x72", "--frames", "12", "--repeat", "1", "--jobs", "1"]

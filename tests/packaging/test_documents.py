@@ -35,8 +35,6 @@ DOCUMENTS = [
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)[^)]*\)")
 QUOTED = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")
 """A path in backticks: it has a slash."""
-NAMED = re.compile(r"`([\w/]+\.py)`, `(\w+)`")
-"""A file, and a name that it defines."""
 COMPUTED = re.compile(r"\]\(([\w./]+\.py)\)((?:,? `\w+`)+)")
 """A link to a file, and names that it defines."""
 HEALTH = ("failed", "degraded")
@@ -74,14 +72,6 @@ def test_every_path_exists(name):
     ]
     assert paths or name.startswith("docs/")
     assert not missing
-
-
-def test_every_name_is_defined_in_the_file_it_follows():
-    named = NAMED.findall((ROOT / "docs" / "architecture.md").read_text())
-    assert named
-    for path, name in named:
-        defined = rf"^(def|class) {name}\b|^{name}\b.*="
-        assert re.search(defined, (PACKAGE / path).read_text(), re.MULTILINE), f"{path}: {name}"
 
 
 def test_every_function_of_the_method_is_defined_in_the_file_it_follows():
@@ -317,7 +307,7 @@ def final(fleet):
 def fleets(tmp_path_factory):
     """A folder with a fleet."""
     folder = tmp_path_factory.mktemp("fleets")
-    fleet_of(folder / "monday", 30, frames=5)
+    fleet_of(folder / "monday", 12, frames=5)
     return folder
 
 

@@ -3,6 +3,7 @@
 import doctest
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,6 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from pypdf import PdfReader
 
 import roadeval
 from tests.golden import drive
@@ -20,20 +20,14 @@ from tests.golden import drive
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_the_tour_of_the_api_runs(tmp_path):
+def test_the_tour_of_the_api_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "recordings").mkdir()
-    drive.write(tmp_path / "recordings" / "demo.mcap")
-    run = subprocess.run(
-        [sys.executable, ROOT / "examples" / "api.py"],
-        cwd=tmp_path,
-        env=os.environ | {"MPLBACKEND": "agg"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert run.returncode == 0, run.stderr
-    assert "filtered   ERR of the final mask: " in run.stdout
-    assert "svm" in run.stdout
+    drive.write(tmp_path / "recordings" / "demo.mcap", frames=21)
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(ROOT / "examples" / "api.py"), run_name="__main__")
+    printed = capsys.readouterr().out
+    assert "filtered   ERR of the final mask: " in printed
+    assert "svm" in printed
     out = tmp_path / "reports" / "api"
     wanted = {"demo.rrd", "frames.csv", "errors.png", "layers.png", "demo.model"}
     assert wanted <= {path.name for path in out.iterdir()}
@@ -46,14 +40,13 @@ def test_the_example_method_is_installed_and_replayed_by_its_entry_point(tmp_pat
          "--target", tmp_path / "site", tmp_path / "method")  # fmt: skip
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
     log = drive.write(tmp_path / "drive.mcap", frames=14)
+    (tmp_path / "plain.toml").write_text("training.frames = 4\noutput.figures = false\n")
     _run("-m", "roadeval", "replay", log, "--variant", f"mine={tmp_path / 'method/smooth.toml'}",
-         "--train-frames", "4", "--save", "out.rrd", "--reports", "reports",
+         "--config", "plain.toml", "--save", "out.rrd", "--reports", "reports",
          cwd=tmp_path, env=environment)  # fmt: skip
     rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
     assert set(rows.stage) == {"smooth", "post"}
     assert roadeval.Recording(tmp_path / "out.rrd").layer("mine", "texture", 11).any()
-    pages = PdfReader(roadeval.write_report(tmp_path / "out.rrd", tmp_path / "report.pdf")).pages
-    assert any("smooth" in page.extract_text() for page in pages)
 
 
 def _run(*words, **options):

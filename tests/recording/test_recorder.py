@@ -198,7 +198,15 @@ def recorded_with_too_little_room(path, limit):
     return done.stdout.splitlines()[-1]
 
 
-@pytest.mark.parametrize("share", [0.001, 0.02, 0.3, 0.6, 0.9, 0.99])
+@pytest.mark.parametrize(
+    "share",
+    [
+        0.001,
+        0.3,
+        0.99,
+        *(pytest.param(share, marks=pytest.mark.sweep) for share in (0.02, 0.6, 0.9)),
+    ],
+)
 def test_a_file_that_may_not_grow_ends_the_run_and_does_not_get_its_name(
     recording, tmp_path, share
 ):

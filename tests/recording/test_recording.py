@@ -1,6 +1,7 @@
 """What was recorded is read back: images, numbers and texts, layers of each kind."""
 
 import io
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -16,6 +17,7 @@ from roadeval.data import ERRORS, RESERVED, TRUTH, LayerKind, LayerSpec, Packed
 from roadeval.images.decoding import palette_indices, to_labels
 from roadeval.images.formats import Limits
 from roadeval.recording import codecs as pngs
+from roadeval.recording import views
 from roadeval.recording.codecs import codec
 from roadeval.recording.layout import SHADOW_TRUTH, Layout, RecordingError, RecordRule
 from roadeval.recording.recorder import Recorder
@@ -43,6 +45,19 @@ def test_the_cameras_own_file_is_passed_on(tmp_path):
     back = record(tmp_path / "out.rrd", [replace(unscored(0), frame=logged)]).image(0)
     decoded = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR_RGB)
     np.testing.assert_array_equal(back, decoded)
+
+
+def test_the_viewer_shows_each_frame_s_rates_in_percent_beside_the_drive_s(drive, tmp_path):
+    recording = record(tmp_path / "out.rrd", [drive[1], drive[2]])
+    rows = recording._file.rows("/results/frame/filtered", "TextDocument:text")
+    assert dict(rows) == {
+        1: "This frame:\nnot scored",
+        2: "This frame:\nERR 25.00 %\nFPR 50.00 %\nFNR 50.00 %",
+    }
+    summary = json.dumps({"totals": {"filtered": {"post": {"ERR": 0.0279}}}})
+    ended = dict(views.after_the_last_frame(layout(), {"summary": summary}))
+    (header,) = ended["/results/guide/filtered"]
+    assert "Drive:  \nERR 2.79 %" in str(header.text.as_arrow_array())
 
 
 def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tmp_path):

@@ -97,6 +97,17 @@ def test_ticks_are_round_numbers_inside_the_range(low, high, expected):
     assert ticks(AxisRange(low, high), 4) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("more", [{"across": "recall", "x_range": (0, 101)}, {"names": ["a", "b"]}])
+def test_the_last_number_below_a_chart_has_room(more):
+    kind = ChartKind.MARKS if "names" in more else ChartKind.LINES
+    placed = place_chart(
+        Chart("ERR", kind, [Series("a", Look("#000000"), [0, 1], [0, 99])], **more)
+    )
+    place, number = placed.x_ticks[-1]
+    assert number == "100"
+    assert place <= 95
+
+
 def test_marks_have_their_value_and_interval_and_leave_out_what_is_undefined():
     own = series([0, 1], [2.0, math.nan], low=[1.0, math.nan], high=[4.0, math.nan])
     made = place_chart(Chart("ERR", ChartKind.MARKS, [own], names=["lit", "shadow"]))

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from io import BytesIO
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from PIL import Image
@@ -82,9 +84,8 @@ def as_in_a_run():
 
 def texts(figure: Figure) -> str:
     legends = [legend for ax in figure.axes if (legend := ax.get_legend())]
-    titles = [legend.get_title() for legend in legends]
     names = [name for legend in legends for name in legend.get_texts()]
-    return " ".join(text.get_text() for text in (*figure.texts, *titles, *names))
+    return " ".join(text.get_text() for text in (*figure.texts, *names))
 
 
 def pictures(figure: Figure) -> list[list[np.ndarray]]:
@@ -117,6 +118,44 @@ def test_a_long_drive_is_drawn_as_means_of_rows_with_some_marks() -> None:
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
     assert line.get_ydata()[0] == pytest.approx(first.mean())
     assert "the mean of 24 rows of 10 frames" in texts(figure)
+
+
+def test_the_legend_reads_row_by_row_in_the_order_of_the_variants() -> None:
+    figure = error_rate("", a_table(3, [*"abcd"]))
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    # Matplotlib fills three columns, one after the other, with two, one and one.
+    assert names == ["a", "d", "b", "c"]
+
+
+@pytest.mark.parametrize(("last", "said"), [(10, ""), (4, ", the last of 4")])
+def test_a_short_last_point_is_marked_and_said(last: int, said: str) -> None:
+    figure = fp_fn_rate("drive", a_table(3, last=last))
+    assert f"is the mean of 10 frames{said};" in texts(figure)
+    assert ("mean of 4" in texts(figure)) == bool(said)
+    spans = [[round(p.get_x(), 1), p.get_width()] for ax in figure.axes for p in ax.patches]
+    assert spans == [[19.5, 4]] * len(figure.axes) * bool(said)
+
+
+@pytest.mark.parametrize("draw_it", [error_rate, fp_fn_rate])
+def test_a_figure_for_a_column_has_its_width_and_no_words_above(draw_it: Any) -> None:
+    figure = draw_it("", a_table(3, last=4), 3.35)
+    assert figure.get_figwidth() == 3.35
+    assert not figure.texts
+    FigureCanvasAgg(figure).draw()
+    box = figure.axes[0].get_legend().get_window_extent()
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= figure.bbox.y1
+
+
+def test_a_vector_file_holds_its_text_as_text(tmp_path: Path) -> None:
+    files = write_figures(tmp_path, "a drive", a_table(3), [], width=4, kinds=("pdf", "svg"))
+    pdf, svg = (path for path in files if path.stem == "fig3a_error_rate")
+    assert ">Error rate on a drive</text>" in svg.read_text()
+    (page,) = PdfReader(pdf).pages
+    assert "Error rate on a drive" in page.extract_text()
+    fonts = page["/Resources"]["/Font"].values()
+    assert {font.get_object()["/Subtype"] for font in fonts} == {"/Type0"}
+    assert page.mediabox.width == pytest.approx(4 * 72, abs=0.1)
 
 
 def test_a_frame_without_a_mask_is_faded_in_its_column() -> None:

@@ -65,7 +65,6 @@ def a_fleet_of(errors, folder):
 
 CASES = [
     ["filtered", "unfiltered"],
-    ["filtered", "unfiltered", "robust", "gated"],
     ["filtered", "unfiltered", "gated", "close", "same"],
     ["unfiltered", "robust", "gated"],
 ]

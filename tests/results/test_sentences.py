@@ -6,6 +6,7 @@ import pytest
 
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
+from roadeval.evaluation.comparison.compare import RegionChange
 from roadeval.evaluation.comparison.conditions import Condition
 from roadeval.results import comparison
 from roadeval.results.comparison import (
@@ -48,6 +49,19 @@ def test_masks_of_which_nothing_changed_are_named_in_one_sentence():
     assert "net of new is exactly as good as base" in text
 
 
+@pytest.mark.parametrize(
+    ("row", "why"),
+    [
+        (a_difference(8, 0.1, 17, p_holm=0.4, comparisons=9), "as 9 regions are compared"),
+        (a_difference(8, -1, 17, p=0.1, p_holm=0.4, comparisons=9), "each change may be chance"),
+        (a_difference(8), "no interval, as 12 frames are too few for an interval"),
+    ],
+)
+def test_why_no_region_is_sure_is_told(row, why):
+    part = RegionChange("new", "net", "lit", "in light", 12, 0.1, 0.2, row)
+    assert why in comparison.where(a_comparison(a_change(WORSE, "net"), regions=(part,)))[0]
+
+
 def test_changed_settings_are_told_of_each_result_and_some_of_many():
     chains = ["svm"], ["trees", "post"]
     settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}
@@ -79,13 +93,12 @@ def test_the_headline_says_whether_limits_were_kept(holds, said):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("post.filtered.ERR > 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} holds"),
-        ("post.filtered.ERR < 1pp", "changed by +1.20 pp (10.00 % to 11.20 %): {} does not hold"),
+        ("post.filtered.ERR > 1pp", "changed by +1.20 points, from 10.00 % to 11.20 % (limit: {})"),
         (
             "post.filtered.ERR > 1pp surely",
-            "changed by +1.20 pp [+0.50, +2.00] (10.00 % to 11.20 %): {} does not hold",
+            "changed by +1.20 points [+0.50, +2.00], from 10.00 % to 11.20 % (limit: {})",
         ),
-        ("post.filtered.ERR > 11%", "is 11.20 %: {} holds"),
+        ("post.filtered.ERR > 11%", "is 11.20 % (limit: {})"),
     ],
 )
 def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):

@@ -104,7 +104,7 @@ def test_the_gap_beside_spread_frames_is_a_quarter_of_their_distance(count, expe
 
 
 def test_spread_frames_that_leave_nothing_to_evaluate_are_an_error():
-    with pytest.raises(TrainingError, match=r"6 labelled frames, .* take 3 of them and 3 more"):
+    with pytest.raises(TrainingError, match=r"all 6 .* training \(3\) .* gap \(3\)"):
         learn(log(6), frames=3, placement="spread", gap=1)
 
 
@@ -138,7 +138,7 @@ def test_training_frames_are_bounded_in_memory(monkeypatch):
 
 @pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
 def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
-    with pytest.raises(TrainingError, match=r"none is left to evaluate; set `training\.frames`"):
+    with pytest.raises(TrainingError, match=r"none is left to score; set `training\.frames`"):
         learn(log(4), frames=frames, gap=gap)
 
 

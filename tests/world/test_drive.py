@@ -4,6 +4,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -35,6 +36,7 @@ def test_the_shipped_drive_is_whole_and_small():
     assert {*np.diff([stamp for topic, stamp, _ in found if topic == IMAGE_TOPIC])} == {500_000_000}
 
 
+@pytest.mark.sweep  # ten seconds for the models of houses and trees
 def test_the_shipped_drive_is_what_the_code_renders():
     """Up to what another version of a library may round differently."""
     image, road, shadow = (data for _, _, data in messages(DEMO)[:3])

@@ -50,11 +50,14 @@ def compare(
 ) -> int:
     """Compare results with the first, or the variants of one.
 
+        roadeval compare old.rrd new.rrd
+        roadeval compare old.rrd new.rrd --fail-if "post.filtered.ERR > +0.5pp"
+
     Drives are paired by name or log, and frames by stamp. Frames that trained either result are
     left out. One drive is judged over its frames, several drives are judged over the drives.
     Results of different drives are not compared. Exit code 4 if a --fail-if condition holds; 1 if
     one cannot be judged, as when two results share fewer than ten frames, or fewer than half the
-    frames of the smaller one; 3 if drives of a fleet failed, so that no number counts them.
+    frames of the smaller one; 3 if drives of a fleet failed, which are in no number.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
@@ -73,5 +76,7 @@ def compare(
     for warning in compared.comparison.warnings:
         if warning not in compared.lost:
             messages.warning(warning)
+    if not (json or quiet):
+        screen.show_verdict(compared.comparison, console.results())
     lost = messages.losses(compared.lost)
     return messages.conditions(compared.held, compared.unjudged) or lost

@@ -14,6 +14,8 @@ from roadeval.cli.options import OptionValues, takes
 def config(*, options: OptionValues) -> int:
     """Print the whole effective configuration as TOML.
 
+        roadeval config --preset robust > robust.toml
+
     Each setting comes with its meaning and range. The file can be edited and given to --config.
     """
     settings = arguments.configuration(options)

@@ -19,6 +19,8 @@ def demo(
 ) -> int:
     """Write the demo drive: a synthetic road with known truth.
 
+        roadeval demo -o demo.mcap
+
     It has 100 frames of 640x480 pixels at 10 Hz, with truth of the road and of shadow.
     """
     from roadeval.jobs.log_files import demo as write

@@ -40,12 +40,16 @@ def fleet(
 ) -> int:
     """Replay many drives and judge them together.
 
+        roadeval fleet drives/ -o all
+        roadeval fleet drives/ -o all --variant robust --jobs 4
+
     The drives are replayed on this machine or on a cluster. The same command again replays only
     what is missing or has changed. A drive that cannot be used is a row with the reason, and the
     exit code is 3 then.
     """
     config = arguments.configuration(options)
     from roadeval.cli.screens import fleet as screen
+    from roadeval.cli.screens.tables import show_verdict
     from roadeval.jobs.run.fleet import replay_fleet as run
 
     with progress.show(quiet) as watch:
@@ -57,4 +61,13 @@ def fleet(
     messages.warn_of_missing_loops()
     for sentence in screen.problems(outcome):
         messages.warning(sentence)
+    if lines := [*screen.manifest(outcome.facts)]:
+        messages.note(
+            "labels differ from drive to drive: state `labels` in a manifest, as drives.toml, and "
+            "give that in place of the drives"
+        )
+        for line in lines:
+            console.diagnostics().print(line, soft_wrap=True)
+    if not (json or quiet):
+        show_verdict(outcome.facts, console.results())
     return ExitCode.LOSS if outcome.lost else ExitCode.DONE

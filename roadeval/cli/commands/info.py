@@ -23,6 +23,8 @@ def info(
 ) -> int:
     """Show what is in a log and what replay would pick.
 
+        roadeval info drive.mcap
+
     Shows the topics with their kind, size, number and rate of messages, gaps and damage; and why
     replay would pick what it picks, or what it would ask for. If the log has more than 50 MB, only
     its indexes are read, unless --verify is given.

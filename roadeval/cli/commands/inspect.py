@@ -34,7 +34,7 @@ Focus = Annotated[
 Screenshot = Annotated[
     Path | None,
     arguments.option(
-        "--screenshot",
+        "-o --output --screenshot",
         "File for a picture of the frame; no window opens. Default: the worst frame with pictures.",
         "FILE.png",
     ),
@@ -53,6 +53,9 @@ def inspect(
     json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
+
+        roadeval inspect recordings/drive.rrd --list
+        roadeval inspect recordings/drive.rrd --worst 1 --screenshot worst.png
 
     The viewer works offline and listens on 127.0.0.1 alone. Among neighbouring frames only the
     worst is listed. In a fleet the frames of all drives are ranked together, and the worst one

@@ -28,6 +28,8 @@ def pack(
 ) -> int:
     """Make a log of a folder of images or a video.
 
+        roadeval pack images/ --truth masks/ -o drive.mcap
+
     Foxglove and Rerun open the log, too. JPEGs are copied, masks become PNGs, and the messages
     have Foxglove's protobuf schemas.
     """

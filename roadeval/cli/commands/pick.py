@@ -20,7 +20,7 @@ def pick(
     sources: Annotated[
         list[Path],
         arguments.argument(
-            "DRIVE|RESULT",
+            "DRIVE|RESULT...",
             "Camera logs (MCAP), which are replayed first, results of them with their recordings, "
             "or a fleet's folder.",
         ),
@@ -47,6 +47,8 @@ def pick(
     quiet: arguments.Quiet = False,
 ) -> int:
     """Pick frames of a log without truth to label.
+
+        roadeval pick drive.mcap -n 20 -o labels
 
     Half of them are drawn at random along the drive; from these 'replay --truth FOLDER' estimates
     the rates of the whole drive, with an interval. The others are the most uncertain ones, apart

@@ -19,6 +19,10 @@ def replay(
 ) -> int:
     """Replay a log; record, score and plot every step.
 
+        roadeval replay drive.mcap
+        roadeval replay drive.mcap --truth labels/ --net mine=net.onnx
+        roadeval replay drive.mcap --variant robust --save robust.rrd
+
     Every intermediate goes into a recording for the Rerun viewer. If the log has truth, each stage
     is scored against it, with the shadow filter and without.
     """
@@ -37,4 +41,6 @@ def replay(
     messages.warn_of_missing_loops()
     for warning in outcome.warnings:
         messages.warning(warning)
+    if not (json or quiet):
+        screen.show_verdict(outcome.facts, console.results())
     return messages.losses(outcome.losses)

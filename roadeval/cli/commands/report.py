@@ -1,12 +1,20 @@
-"""``roadeval report``: the report of a drive or of a fleet, as a PDF or as a page."""
+"""``roadeval report``: the report of a drive or of a fleet, or the paper's figures of a drive."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
+
+
+def _check_width(width: str) -> str:
+    from roadeval.jobs.results.report import inches_of
+
+    with arguments.usage():
+        inches_of(width)
+    return width
 
 
 def report(
@@ -23,22 +31,53 @@ def report(
         ),
     ] = None,
     focus: arguments.Focus = None,
+    figures: Annotated[
+        Path | None,
+        arguments.option(
+            "--figures",
+            "Folder for the paper's figures 2, 3a and 3b as PDF and SVG, in place of the report. "
+            "Figure 2 needs a recording.",
+            "DIR",
+        ),
+    ] = None,
+    width: Annotated[
+        str,
+        arguments.option(
+            "--width",
+            "Width of each figure, as 8.5cm, 85mm or 3.35in; letters keep their size.",
+            "LENGTH",
+            callback=_check_width,
+        ),
+    ] = "16cm",
+    title: Annotated[
+        Literal["drive", "none"],
+        arguments.option(
+            "--title",
+            "Title of each figure: what it shows and the drive's name, or none, if a text has its "
+            "own captions.",
+        ),
+    ] = "drive",
     camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Write the report of a drive or of a fleet, as a PDF or as a page.
 
+        roadeval report recordings/drive.rrd -o drive.html
+        roadeval report reports/drive -o drive.pdf
+
     It shows whether the filter helps, where the errors are, which stage causes them, and which
     frames to look at. A recording is enough; the report of a results folder has no pictures. A
     page is one file that needs no network and no server.
     """
-    from roadeval.jobs.results.report import write_report
+    from roadeval.jobs.results.report import write_figures, write_report
     from roadeval.jobs.results.result import Result
 
     opened = arguments.select_camera(Result(result, focus=focus), camera)
-    with progress.show(quiet) as watch:
-        path = write_report(opened, output, on_progress=watch)
-    if not quiet:
+    paths = write_figures(opened, figures, width=width, title=title) if figures else []
+    if output or not figures:
+        with progress.show(quiet) as watch:
+            paths.append(write_report(opened, output, on_progress=watch))
+    for path in paths if not quiet else ():
         console.emit(str(path))
     for warning in opened.warnings:
         messages.warning(warning)

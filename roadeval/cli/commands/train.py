@@ -22,7 +22,8 @@ def train(
     paths: Annotated[
         list[str],
         arguments.argument(
-            "DRIVE", "Camera logs (MCAP), mostly with truth, folders, URLs, or manifests (.toml)."
+            "DRIVE...",
+            "Camera logs (MCAP), mostly with truth, folders, URLs, or manifests (.toml).",
         ),
     ],
     *,
@@ -31,6 +32,8 @@ def train(
     quiet: arguments.Quiet = False,
 ) -> int:
     """Train a model on some drives, for use on others.
+
+        roadeval train monday.mcap tuesday.mcap -o city.model
 
     The training frames are labelled ones, spread evenly over each drive. If no drive has road
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.

@@ -9,14 +9,21 @@ from roadeval.cli.screens import tables
 from roadeval.evaluation.comparison.compare import Comparison
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.report.comparison import changed_drives, overview
-from roadeval.results.comparison import NAMED
+from roadeval.results.comparison import NAMED, verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
 def show(comparison: Comparison, judgements: Sequence[Judgement], out: Console) -> None:
-    """Print what changed, and the conditions that do not hold; the others are errors."""
+    """Print what changed in numbers, and the conditions that do not hold; the others are errors."""
     judged = [judgement for judgement in judgements if judgement.holds is not None]
     passed = [judgement for judgement in judged if not judgement.holds]
-    tables.show([*overview(comparison, passed, NAMED), *changed_drives(comparison)], out)
+    blocks = [*overview(comparison, passed, NAMED), *changed_drives(comparison)]
+    tables.show([block for block in blocks if getattr(block, "style", "") != "verdict"], out)
+
+
+def show_verdict(comparison: Comparison, out: Console) -> None:
+    """Print the verdict, the last of what a comparison prints but for losses and limits."""
+    out.print()
+    out.print(verdict(comparison), style="bold")

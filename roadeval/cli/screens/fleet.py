@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 from collections.abc import Iterator
+from shlex import quote
 from typing import TYPE_CHECKING, Final
 
 from roadeval.cli import console
-from roadeval.cli.options import with_flags
+from roadeval.cli.options import FLAGS
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
 from roadeval.report.blocks import Heading
@@ -15,11 +18,13 @@ from roadeval.report.sections.drives import by_reason, drives_table
 from roadeval.report.sections.summary import drives_account
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
+from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from roadeval.jobs.run.fleet import FleetOutcome
+    from roadeval.results.facts import FleetFacts
 
 WORST: Final = 12
 """Drives in the table of drives."""
@@ -28,7 +33,7 @@ NAMED: Final = 5
 
 
 def show(outcome: FleetOutcome, out: Console) -> None:
-    """Print how many drives there are, the verdict, the rates, and the effects over drives."""
+    """Print how many drives there are, the rates, the effects over drives, what to do next."""
     facts = outcome.facts
     earlier = sum(outcome.counts.values()) - outcome.replayed
     out.print(drives_account(outcome.counts, facts.frames))
@@ -37,16 +42,19 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     elif earlier > 0:
         out.print(f"{earlier} of them were done before.")
     out.print()
-    out.print(with_flags(facts.verdict))
-    out.print()
     if facts.totals:
-        blocks = [rates_table(facts), *([differences_table(facts)] if facts.effects else [])]
+        blocks = [rates_table(facts)]
+        blocks += [differences_table(facts, brief=True)] if facts.effects else []
         worst = drives_table(FleetFolder(outcome.folder), WORST)
-        tables.show([*blocks, Heading("Drives with the highest ERR"), worst], out)
+        tables.show(
+            [*blocks, Heading(f"Drives with the highest ERR of {focus_of(facts.finals)}"), worst],
+            out,
+        )
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
-    inspect = [f"roadeval inspect {outcome.folder} --list"] if facts.totals else []
-    console.show_next(out, *inspect, f"roadeval report {outcome.folder}")
+    folder = quote(str(outcome.folder))
+    page = f"roadeval report {folder} -o {quote(f'{outcome.folder.name}.html')}"
+    console.show_next(out, page, *([f"roadeval inspect {folder} --list"] if facts.totals else []))
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
@@ -55,4 +63,20 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     fleet = FleetFolder(outcome.folder)
     failed = fleet.drives.loc[[*outcome.problems]]
     for reason, drives in by_reason(fleet, failed).items():
-        yield f"{first_of(drives, NAMED)}: {reason}"
+        told = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
+        yield f"{first_of(drives, NAMED)}: {told}"
+
+
+def manifest(facts: FleetFacts) -> Iterator[str]:
+    """Yield the lines of a manifest to copy, if drives failed because their labels differ.
+
+    Labels that the command named are those of the drives that did not fail by them.
+    """
+    odd = {drive for drive, reason in facts.failed.items() if "`labels." in reason}
+    named = {key: value for key, value in facts.run["labels"].items() if value}
+    labels = ", ".join(f"{key} = {json.dumps(value)}" for key, value in named.items())
+    for drive in facts.drives[:NAMED] if odd and len(facts.drives) > 1 else ():
+        yield from ("[[drives]]", f"path = {json.dumps(drive.source)}")
+        if bool(labels) != (drive.drive in odd):
+            yield f"labels = {{ {labels or 'road = [1]'} }}"
+        yield ""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
+from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted
 from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
@@ -18,7 +21,7 @@ from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction
-from roadeval.results.verdict import without_truth
+from roadeval.results.verdict import ROBUST, without_truth
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,27 +30,31 @@ if TYPE_CHECKING:
 
 
 def show(outcome: Outcome, out: Console) -> None:
-    """Print what a replay read, each variant's rates, the outputs' places, and last the verdict."""
+    """Print what a replay read, each variant's rates, the outputs' places, and what to do next."""
     facts = outcome.facts
     cameras = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
-    out.print(f"{facts.drive.name}: {cameras}{account(facts.frames, facts.windows)}")
+    out.print(f"{facts.drive.name}: {cameras}{account(facts.frames)}")
     out.print()
     if facts.totals:
         tables.show([*_score_tables(facts, outcome.metres)], out)
-    else:
-        for sentence in facts.misfits:
-            out.print(with_flags(sentence))
-        why = "every frame with road truth was trained on or left out"
-        if not facts.frames.labelled:
-            why = "no frame that was read has road truth"
-        out.print(f"Nothing to score: {why}.")
-        for sentence in without_truth(facts.unlabelled):
-            out.print(sentence)
-    out.print()
-    _show_files(outcome, out)
-    if facts.totals:
         out.print()
-        tables.show([Text(with_flags(facts.verdict))], out)
+    _show_files(outcome, out)
+
+
+def show_verdict(facts: Facts, out: Console) -> None:
+    """Print the verdict, the last of what a replay prints but for losses."""
+    if facts.totals:
+        tables.show_verdict(facts, out)
+        return
+    out.print()
+    for sentence in facts.misfits:
+        out.print(with_flags(sentence))
+    why = "every frame with road truth was trained on or left out"
+    if not facts.frames.labelled:
+        why = "no frame that was read has road truth"
+    out.print(f"Nothing to score: {why}.")
+    for sentence in without_truth(facts.unlabelled):
+        out.print(sentence)
 
 
 def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
@@ -73,22 +80,45 @@ def _show_files(outcome: Outcome, out: Console) -> None:
     if outcome.reports:
         count = len(outcome.files)
         out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
+    if figures := [str(file) for file in outcome.files if file.suffix == ".png"]:
+        out.print(f"figures    {' '.join(figures)}", soft_wrap=True)
     if place := outcome.recording or outcome.reports:
-        console.show_next(out, *_next_commands(outcome, place))
+        console.show_next(out, *islice(_next_commands(outcome, place), 3))
 
 
 def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:
-    """Yield the commands to type next."""
-    scored, log = bool(outcome.facts.totals), outcome.facts.log
+    """Yield the commands to type next, of which the first are the most useful."""
+    facts, path = outcome.facts, quote(str(place))
+    yield f"roadeval report {path} -o {quote(place.with_suffix('.html').name)}"
+    yield from _next_step(outcome, place)
     if outcome.recording and has_screen():
-        yield f"rerun {place}"
-    elif outcome.recording and scored:
-        yield f"roadeval inspect {place} --worst 1 --screenshot worst.png"
-    if scored or outcome.facts.unlabelled:
-        yield f"roadeval inspect {place} --list"
-    elif not outcome.facts.frames.labelled and log is not None:
-        yield f"roadeval replay {log.path} --truth LABELS"
-    yield f"roadeval report {place}"
+        yield f"rerun {path}"
+    if facts.totals or facts.unlabelled:
+        yield f"roadeval inspect {path} --list"
+    if outcome.recording and facts.totals:
+        yield f"roadeval inspect {path} --worst 1 --screenshot worst.png"
+
+
+def _next_step(outcome: Outcome, place: Path) -> Iterator[str]:
+    """Yield the command that the result asks for, if it asks for one.
+
+    It brings labels, compares two masks, or adds the preset for real roads to a weak result.
+    """
+    facts, path = outcome.facts, quote(str(place))
+    log = quote(facts.log.path) if facts.log else "DRIVE.mcap"
+    config = path if outcome.recording else quote(str(place / "run.toml"))
+    brought = [name for name in facts.finals if name not in (FILTERED, UNFILTERED, BASELINE)]
+    masks = [*brought[:2], *(name for name in (FILTERED, UNFILTERED) if name in facts.finals)][:2]
+    if facts.unlabelled and not facts.frames.labelled:
+        yield f"roadeval pick {path if outcome.recording else log} -n 20 -o labels"
+    elif not facts.frames.labelled and facts.log is not None:
+        yield f"roadeval replay {log} --truth LABELS"
+    elif brought and len(masks) > 1:
+        new, base = map(quote, masks)
+        yield f"roadeval compare {path} --variant {base} --variant {new}"
+    elif f"--variant {ROBUST}" in facts.verdict:
+        save = quote(f"{place.stem}_{ROBUST}.rrd")
+        yield f"roadeval replay {log} --config {config} --variant {ROBUST} --save {save}"
 
 
 def megabytes(file: Path) -> str:

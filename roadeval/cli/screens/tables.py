@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
-from roadeval.data import words
+from roadeval.cli.options import with_flags
+from roadeval.data import BASELINE, words
+from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, BulletList, Cell, Heading, Table, Text, plain
+from roadeval.results.facts import Facts, FleetFacts
+from roadeval.results.verdict import focus_of
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,13 +40,30 @@ def show(blocks: Iterable[Block], out: Console) -> None:
                 raise NotImplementedError(f"a terminal shows no {block.kind}")
 
 
+def show_verdict(facts: Facts | FleetFacts, out: Console) -> None:
+    """Print a verdict: green if its focus is better than the baseline, red if not.
+
+    It is yellow if truth, masks and images do not fit.
+    """
+    focus, style = focus_of(facts.finals), "bold"
+    for effect in facts.final_effects:
+        if (effect.base, effect.variant) == (BASELINE, focus) and effect.rates[TESTED].units:
+            style = "bold green" if effect.rates[TESTED].mean < 0 else "bold red"
+    if isinstance(facts, Facts) and facts.misfits:
+        style = "bold yellow"
+    out.print()
+    out.print(with_flags(facts.verdict), style=style)
+
+
 def show_table(table: Table, out: Console) -> None:
     """Print a table.
 
-    Columns of numbers for which the console has no room are printed below, with the names again.
+    If the console has no room for it, headings of several words have a line for each. Columns of
+    numbers that do not fit even so are printed below, with the names again.
     """
     from rich import box
     from rich.table import Table as Grid
+    from rich.text import Text as Line
 
     if table.caption:
         out.print(ascii_of(table.caption))
@@ -49,15 +71,19 @@ def show_table(table: Table, out: Console) -> None:
     for place in range(len(table.columns)):
         texts = [plain(row[place]).replace(f" {words.MINUS} ", " - ") for row in table.rows]
         columns.append(texts if place in table.text_columns else [*map(ascii_of, texts)])
-    for number, part in enumerate(_parts(table, columns, out.width)):
+    titles = [*map(ascii_of, map(visible, table.columns))]
+    if len([*_parts(table, titles, columns, out.width)]) > 1:
+        height = max(title.count(" ") for title in titles)
+        titles = ["\n" * (height - title.count(" ")) + title.replace(" ", "\n") for title in titles]
+    for number, part in enumerate(_parts(table, titles, columns, out.width)):
         if number:
             out.print()
         grid = Grid(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
         for place in part:
-            if place in table.text_columns:
-                grid.add_column(table.columns[place], overflow="fold")
-            else:
-                grid.add_column(ascii_of(table.columns[place]), justify="right", no_wrap=True)
+            is_text = place in table.text_columns
+            justify: Literal["left", "right"] = "left" if is_text else "right"
+            title = Line(titles[place])
+            grid.add_column(title, justify=justify, no_wrap=not is_text, overflow="fold")
         for line, row in enumerate(table.rows):
             cells = {place: out.render_str(columns[place][line]) for place in part}
             for place, text in cells.items():
@@ -73,15 +99,17 @@ def ascii_of(number: str) -> str:
     return number.translate(str.maketrans(signs, "--~"))
 
 
-def _parts(table: Table, columns: Sequence[Sequence[str]], room: int) -> Iterator[list[int]]:
+def _parts(
+    table: Table, titles: Sequence[str], columns: Sequence[Sequence[str]], room: int
+) -> Iterator[list[int]]:
     """Divide the columns of numbers into parts that fit beside the names.
 
     There are as few parts as possible, with about as many columns each, and at least one.
     """
     from rich.cells import cell_len
 
-    titled = zip(table.columns, columns, strict=True)
-    widths = [GAP + max(map(cell_len, [title, *texts])) for title, texts in titled]
+    titled = zip(titles, columns, strict=True)
+    widths = [GAP + max(map(cell_len, [*title.split("\n"), *texts])) for title, texts in titled]
     names = [*table.text_columns]
     free = room + GAP - sum(min(widths[place], GAP + LONGEST) for place in names)
     parts: list[list[int]] = [[]]

@@ -58,6 +58,7 @@ from roadeval.evaluation.tables import (
     values_of,
 )
 from roadeval.runtime.sentence import Sentence, Setting
+from roadeval.runtime.text import likely
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -206,14 +207,15 @@ def variants_as_sides(
     names = list(chosen or pipelines)
     for name in names:
         if name not in variants:
-            raise ComparisonError(
-                f"{result.label}: no variant {name}; there are {', '.join(variants)}"
-            )
+            choice = f"{likely(name, variants)}there are {', '.join(variants)}"
+            raise ComparisonError(f"no variant {name}", where=result.label, remedy=choice)
     if len(names) < 2:
         lone = f"{names[0]} alone" if names else "no variant"
         raise ComparisonError(
-            f"{result.label}: {lone} cannot be compared; name two of its variants with --variant "
-            f"({', '.join(variants) or 'it has none'}), or a second result"
+            f"{lone} cannot be compared",
+            where=result.label,
+            remedy="name two of its variants with --variant "
+            f"({', '.join(variants) or 'it has none'}), or a second result",
         )
     return [replace(result, label=name, variants={name: name}) for name in names]
 
@@ -229,7 +231,9 @@ def compare(
     """
     for side in sides:
         if not side.scored:
-            raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
+            raise ComparisonError(
+                "nothing was scored, so nothing can be compared", where=side.label
+            )
     base, *others = sides
     parts = []
     for new in others:

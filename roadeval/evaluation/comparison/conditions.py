@@ -93,16 +93,21 @@ class Condition:
         stage, variant, rate, sign, number, unit, surely = match.groups()
         if rate not in QUANTITIES:
             raise ConditionError(
-                f"{text!r}: there is no rate {rate}; there are {', '.join(QUANTITIES)}"
+                f"there is no rate {rate}",
+                where=repr(text),
+                remedy=f"there are {', '.join(QUANTITIES)}",
             )
         if surely and unit == "%":
             raise ConditionError(
-                f"{text!r}: 'surely' asks for the interval of a change (pp); a level (%) is that "
-                "of the frames themselves and has none: leave out 'surely', or limit the change"
+                "'surely' asks for the interval of a change (pp); a level (%) is that of the "
+                "frames themselves and has none: leave out 'surely', or limit the change",
+                where=repr(text),
             )
         if surely and rate not in COMPARED:
             raise ConditionError(
-                f"{text!r}: {rate} has no interval; 'surely' goes with {', '.join(COMPARED)}"
+                f"{rate} has no interval",
+                where=repr(text),
+                remedy=f"'surely' goes with {', '.join(COMPARED)}",
             )
         limit = float(number), unit == "pp", bool(surely)
         return cls(" ".join(text.split()), stage, variant, rate, sign, *limit)

@@ -31,7 +31,7 @@ from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.score.counts import Name, changes, contours, count, error_map
-from roadeval.evaluation.score.metres import measure
+from roadeval.evaluation.score.metre_sums import measure
 from roadeval.evaluation.score.unlabelled import doubts_of
 from roadeval.evaluation.settings import (
     DEGRADED_ERR,

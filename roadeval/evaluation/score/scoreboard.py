@@ -41,7 +41,7 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
-from roadeval.evaluation.score.metres import MetreSums
+from roadeval.evaluation.score.metre_sums import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings

@@ -124,7 +124,11 @@ def _failure_sentence(result: Result) -> str:
     if not failed:
         return ""
     named = first_of(failed, NAMED)
-    return f"{result.name}: {len(failed)} of {len(drives)} drives failed, no number counts {named}"
+    verb = "is" if len(failed) == 1 else "are"
+    return (
+        f"{result.name}: {len(failed)} of {len(drives)} drives failed and {verb} in no number: "
+        f"{named}"
+    )
 
 
 def _choose_sides(

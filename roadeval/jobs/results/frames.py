@@ -7,7 +7,16 @@ from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import BASELINE, ERRORS, FILTERED, IGNORE, TRUTH, UNFILTERED, Health, LayerKind
+from roadeval.data import (
+    BASELINE,
+    ERRORS,
+    FILTERED,
+    IGNORE,
+    TRUTH,
+    UNFILTERED,
+    Health,
+    LayerKind,
+)
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.frame import judge
@@ -15,14 +24,12 @@ from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.evaluation.tables import finals, only, scene_ns, values_of
 from roadeval.geometry.plan import Plan
-from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import DriveResult
 from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip
-from roadeval.report.charts.standard import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, fade
-from roadeval.report.sections.frames import SMALL, FrameBrowser, strip
+from roadeval.report.sections.frames import SMALL, strip
 from roadeval.results.facts import focus_of
 from roadeval.results.sentences import notes
 
@@ -34,13 +41,9 @@ if TYPE_CHECKING:
 WORST: Final = 4
 MOVED: Final = 2
 """Frames that a report shows: the worst, and those that the filter helped and harmed most."""
-OUTCOMES: Final = 6
+ERRORS_SHOWN: Final = 6
 LAYERS: Final = 2
 """Variants of which such a frame shows the errors, and all layers, on paper."""
-PICTURED: Final = 24
-"""Frames of a page with pictures, at most."""
-BYTES: Final = 9_900_000
-"""Size of a page, at most."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -75,7 +78,7 @@ class FramePicker:
     """
 
     def __init__(
-        self, result: DriveResult, outcomes: int | None = OUTCOMES, layered: int | None = LAYERS
+        self, result: DriveResult, outcomes: int | None = ERRORS_SHOWN, layered: int | None = LAYERS
     ) -> None:
         self._result = result
         self._outcomes, self._layered = slice(outcomes), slice(layered)
@@ -216,23 +219,6 @@ class FramePicker:
             yield row
 
 
-def browsed(result: DriveResult) -> FrameBrowser:
-    """Collect the frames of a result for a page, without their pictures."""
-    frames, names = result.rows, [*SHORT]
-    if not len(frames):
-        frames = result.table("unlabelled")
-        names = [sign for sign in SIGNS if frames[sign].notna().any()]
-    there = result.recording.variants if result.recording else ()
-    return FrameBrowser(
-        rows=[*facts_of(result)],
-        variants=values_of(frames, "variant"),
-        titles=names,
-        charts=over_frames(frames, names),
-        command=result.inspect("{}") if result.recording else "",
-        masks=[f"{variant.name}: {variant.stages[-1]}" for variant in there],
-    )
-
-
 def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames, focus = result.rows, result.focus or ""
@@ -268,49 +254,3 @@ def _frame_conditions(
             yield "the filter harms" if change > 0 else "the filter helps"
     if blind is not None and rates[focus][TESTED] > blind[TESTED]:
         yield f"{focus} worse than {BASELINE}"
-
-
-def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
-    """Return frames with their pictures, in the drive's order: the worst, the best, and others.
-
-    At most `PICTURED`, and as many as have room in so many bytes of a page.
-    """
-    if result.recording is None:
-        return []
-    chosen = _choose_frames(result, PICTURED)
-    picker, strips = FramePicker(result, None, None), []
-    for done, frame in enumerate(chosen, 1):
-        made = picker.strip(frame)
-        # On a page pictures are text, with words around each.
-        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
-        if room < 0:
-            break
-        strips.append(made)
-        on_progress(Progress(done, len(chosen), "reading"))
-    return sorted(strips, key=lambda strip: strip.frame)
-
-
-def _choose_frames(result: DriveResult, count: int) -> list[int]:
-    """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
-    rows = result.rows
-    scored_frames = {*rows["frame"]}
-    there = [number for number in result.pictured if number in scored_frames]
-    pictured = there or [*result.pictured]
-    focus = result.facts.focus
-    count = min(count, len(pictured))
-    spread = evenly(pictured, count)
-    if focus is None:
-        unlabelled = result.facts.unlabelled
-        doubtful = [
-            frame for frame in (unlabelled.look_at if unlabelled else ()) if frame in pictured
-        ]
-        return list(dict.fromkeys([*doubtful, *spread]))[:count]
-    masks = finals(only(rows, variant=focus))
-    masks = masks[masks["frame"].isin(pictured)]
-    worst = tables.worst(masks, count)["frame"].tolist()
-    best = tables.worst(masks, len(masks), apart_ns=0)["frame"].tolist()[::-1]
-    turns: list[int] = []
-    for place in range(count):
-        turns += worst[2 * place : 2 * place + 2]
-        turns += [*best[place : place + 1], *spread[place : place + 1]]
-    return list(dict.fromkeys([*turns, *pictured]))[:count]

@@ -20,13 +20,14 @@ from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.logs.truth.drawn import Proposal
 from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import IMAGES, LABELS, PICK, PROPOSALS, Picked, Picks, Why, digest_of
+from roadeval.logs.truth.shapes import Proposal
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
 from roadeval.runtime.files import AnyPath, put, writing
+from roadeval.runtime.text import likely
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -182,7 +183,8 @@ def _pick_frames(drive: DriveResult, request: _Request) -> PickedFrames:
     if not names:
         raise RoadevalError(f"{request.source}: every frame has truth, or none was replayed")
     if (name := request.variant or names[0]) not in names:
-        raise RoadevalError(f"{request.source}: no variant {name}; there are {', '.join(names)}")
+        choice = f"{likely(name, names)}there are {', '.join(names)}"
+        raise RoadevalError(f"no variant {name}", where=request.source, remedy=choice)
     doubts = only(rows, variant=name)
     picks_before = _read_picks(drive, doubts, name, request)
     scores = picks_before.every_score()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
-from roadeval.jobs.results.frames import BYTES, FramePicker, browsed, evenly, strips_of
+from roadeval.jobs.results.frames import FramePicker, evenly
+from roadeval.jobs.results.page import BYTES, FILM_BYTES, browsed, film_of, strips_of
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Report
 from roadeval.report.document import document, page_document
@@ -20,7 +23,7 @@ from roadeval.report.page.render import page, write_page
 from roadeval.report.pdf.typeset import typeset, write_file
 from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
-from roadeval.runtime.files import leads_outside
+from roadeval.runtime.files import leads_outside, writing
 
 PAGES: Final = (".html", ".htm")
 """Endings of files that are written as a page."""
@@ -67,6 +70,83 @@ def write_report(
         return write_page(path, page_of(opened, on_progress))
 
 
+WIDTHS: Final = (4, 100)
+"""Least and greatest width of a figure, in centimetres."""
+_INCHES: Final = {"cm": 1 / 2.54, "mm": 1 / 25.4, "in": 1.0}
+
+
+def inches_of(width: str) -> float:
+    """Return a width in inches; a `RoadevalError` if it is none for a figure.
+
+    >>> inches_of("85mm") == inches_of("8.5 cm")
+    True
+    """
+    number, unit = width[:-2], width[-2:]
+    try:
+        inches = float(number) * _INCHES[unit]
+    except (ValueError, KeyError):
+        inches = math.nan
+    least, most = WIDTHS
+    if not least - 1e-9 <= 2.54 * inches <= most + 1e-9:
+        raise RoadevalError(
+            f"{width} is no width of a figure",
+            remedy=f"write it as 8.5cm, 85mm or 3.35in, from {least} to {most} cm",
+        )
+    return inches
+
+
+def write_figures(
+    result: str | Path | Result,
+    folder: str | Path,
+    *,
+    width: str = "16cm",
+    title: Literal["drive", "none"] = "drive",
+) -> list[Path]:
+    """Write the paper's figures 2, 3a and 3b of a drive, each as PDF and SVG; return the files.
+
+    A `RoadevalError` if the result is not of one drive or has nothing to draw, or a file cannot be
+    written.
+
+    Parameters
+    ----------
+    result
+        A recording, or a results folder, which has no pictures for figure 2; or one of these opened
+        already. Each camera of a rig has its own files.
+    folder
+        Made if it is not there. Files of these names are replaced.
+    width
+        Of each figure, as ``8.5cm``, ``85mm`` or ``3.35in``. Letters keep their size.
+    title
+        ``none`` leaves out the lines above a figure, for a text with captions of its own.
+    """
+    from roadeval.report import figures
+
+    inches = inches_of(width)
+    opened = result if isinstance(result, Result) else Result(result)
+    drives = opened.rig or list(filter(None, [opened.drive]))
+    if not drives:
+        raise RoadevalError(
+            "figures are of one drive", where=opened.paths[0], remedy="name the result of a drive"
+        )
+    names = short_names([drive.camera for drive in drives])
+    files: list[Path] = []
+    with writing(folder, RoadevalError):
+        for drive in drives:
+            files += figures.write_figures(
+                *(Path(folder), drive.name, drive.table("windows")),
+                [*FramePicker(drive).examples(_frames_of_figure_2(drive))],
+                names[drive.camera] if opened.rig else "",
+                width=inches,
+                titled=title == "drive",
+                kinds=("pdf", "svg"),
+            )
+    if not files:
+        raise RoadevalError(
+            "there is nothing to draw: neither pictures nor rates", where=opened.paths[0]
+        )
+    return files
+
+
 def findings_of(result: Result) -> Findings | FleetFolder:
     """Collect what the report of a result shows."""
     if result.fleet:
@@ -84,7 +164,11 @@ def page_of(result: Result, on_progress: OnProgress = ignore) -> Report:
         return page_document(findings, None, PICTURED_OF_FLEET)
     frames = browsed(result.drive)
     room = BYTES - len(page(page_document(findings, frames)))
-    strips = strips_of(result.drive, room, on_progress)
+    film = film_of(result.drive, min(room // 2, FILM_BYTES * len(frames.rows)), on_progress)
+    frames = replace(frames, film=film)
+    strips = strips_of(
+        result.drive, room - len(film.content) * 4 // 3 if film else room, on_progress
+    )
     return page_document(findings, replace(frames, strips=strips))
 
 
@@ -93,13 +177,21 @@ THUMBNAILS: Final = 4
 """Frames in figure 2 and on the first page."""
 
 
+def _pictured(result: DriveResult) -> list[int]:
+    """Return the evaluated frames that have pictures, or of a drive without any all that have."""
+    evaluated = {*result.rows["frame"]} or {*result.pictured}
+    return [number for number in result.pictured if number in evaluated]
+
+
+def _frames_of_figure_2(result: DriveResult) -> Sequence[int]:
+    drawn = result.facts.examples
+    is_there = drawn and set(drawn) <= set(result.pictured)
+    return drawn if is_there else evenly(_pictured(result), EXAMPLES)
+
+
 def collect(result: DriveResult) -> Findings:
     """Collect everything that the report of a drive shows."""
-    evaluated = {*result.rows["frame"]} or {*result.pictured}
-    pictured = [number for number in result.pictured if number in evaluated]
-    picker, drawn = FramePicker(result), result.facts.examples
-    if not set(drawn) <= set(result.pictured):
-        drawn = []
+    pictured, picker = _pictured(result), FramePicker(result)
     worst = picker.worst()
     return Findings(
         path=str(result.path),
@@ -110,7 +202,7 @@ def collect(result: DriveResult) -> Findings:
         inspect=result.inspect if result.viewable else None,
         properties=result.properties,
         pictured=len(pictured),
-        examples=[*picker.examples(drawn or evenly(pictured, EXAMPLES))],
+        examples=[*picker.examples(_frames_of_figure_2(result))],
         thumbnails=[*picker.thumbnails(evenly(pictured, THUMBNAILS))],
         worst=worst,
         helped=picker.moved([], harmed=False),

@@ -28,7 +28,7 @@ from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import settings_digest, software
 from roadeval.jobs.run.replay import replay
 from roadeval.jobs.run.train import draw
-from roadeval.logs.truth.labels import label_files
+from roadeval.logs.truth.meaning import label_files
 from roadeval.recording.layout import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
 from roadeval.results.facts import SUMMARY, Facts, focus_of, json_text

@@ -31,7 +31,7 @@ from roadeval.jobs.run.frame import bind, external_layout, external_variant, run
 from roadeval.logs.errors import FrameError
 from roadeval.logs.frames import FrameStream, LoggedFrame, Selection, merge_streams
 from roadeval.logs.log import Log
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.logs.truth.picks import Picks
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View

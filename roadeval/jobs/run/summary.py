@@ -26,7 +26,7 @@ from roadeval.logs.frames import Selection
 from roadeval.logs.log import Log
 from roadeval.logs.settings import LogConfig
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.logs.truth.picks import PICK, Picks
 from roadeval.results.facts import (
     DriveFacts,

@@ -40,29 +40,30 @@ def train(
     total = settings.frames * len(entries)
     held = HeldFrames(lambda count: on_progress(Progress(count, total, "training")))
     with holding(output, inputs=[entry.path for entry in entries]):
-        drawn = {
-            Path(f"{entry.shown} {entry.camera}".rstrip()): draw(entry, entry.config(config), held)
-            for entry in entries
-        }
-        frames = {path: frames_of for path, (frames_of, _) in drawn.items()}
+        frames, losses = dict[Path, list[Frame]](), list[str]()
+        for entry in entries:
+            path = Path(f"{entry.shown} {entry.camera}".rstrip())
+            name = path.name if len(entries) > 1 else ""
+            frames[path], lost = draw(entry, entry.config(config), held, name=name)
+            losses += lost
         model = learning.from_drives(frames, config.pipelines(), settings)
-        losses = [
-            sentence if len(drawn) == 1 or sentence.startswith(start) else f"{start}{sentence}"
-            for path, (_, frames_of) in drawn.items()
-            for start in [f"{path.name}: "]
-            for sentence in frames_of
-        ]
         model = replace(model, losses=tuple(losses))
         save_model(model, Path(output))
         return model
 
 
 def draw(
-    drive: DriveEntry, config: RunConfig, held: HeldFrames, *, labelled: bool = False
+    drive: DriveEntry,
+    config: RunConfig,
+    held: HeldFrames,
+    *,
+    labelled: bool = False,
+    name: str = "",
 ) -> tuple[list[Frame], list[str]]:
-    """Decode the training frames of a drive and hold them; return also what of it was lost.
+    """Decode the training frames of a drive and hold them; return also its losses.
 
-    Where they must be ``labelled``, a drive without road truth gives none.
+    If they must be ``labelled``, a drive without road truth gives none. Sentences on losses begin
+    with the ``name``, if there is one.
     """
     frames, streams = list[Frame](), list[FrameStream]()
     with open_log(open_source(drive.source, config.run.patience_s), config.for_training()) as log:
@@ -86,5 +87,8 @@ def draw(
             total = missing + len(frames)
             losses.append(f"{missing} of {total} training frames could not be decoded")
         if losses and not frames:
-            raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
-        return frames, losses
+            raise TrainingError(
+                f"no training frame could be decoded: {losses[0]}", where=log.path.name
+            )
+        named = {str(damage) for damage in log.damage if damage.path.name == name}
+        return frames, [loss if loss in named or not name else f"{name}: {loss}" for loss in losses]

@@ -10,6 +10,7 @@ from roadeval.logs.errors import LogError
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.reader import TopicInfo
 from roadeval.runtime.sentence import Sentence
+from roadeval.runtime.text import likely
 
 
 def _set(text: str) -> frozenset[str]:
@@ -278,10 +279,17 @@ def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
             if not topic.count:
                 raise LogError(f"{name} holds no message", setting=setting)
             return topic
-    valid = _names(topic for topic in topics if topic.is_image) or "none"
+    images = [topic for topic in topics if topic.is_image]
+    is_camera = setting == "topics.image"
+    fitting = [topic for topic in images if _looks_like_label(topic) != is_camera]
+    kind = "image" if not fitting else "camera" if is_camera else "label"
+    names = _names(fitting or images) or "none"
+    meant = likely(name, [topic.name for topic in fitting or images])
     there = any(topic.name == name for topic in topics)
     what = "carries no images" if there else "is not in the log"
-    raise LogError(f"{name} {what}", setting=setting, remedy=f"its image topics are: {valid}")
+    raise LogError(
+        f"{name} {what}", setting=setting, remedy=f"{meant}its {kind} topics are: {names}"
+    )
 
 
 def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:

@@ -242,7 +242,8 @@ class TopicReader:
             message: Message = source.container.message(chunk, offset)
         except BadRecord as error:
             if source.container.is_bad(chunk):
-                raise LostMessageError(f"{self.name} message {position}: {error}") from error
+                where = f"{self.name} message {position}"
+                raise LostMessageError(str(error), where=where) from error
             return None
         # Times beyond int64 are negative in the table.
         same_time = message.log_time == int(self.log_times[position]) % 2**64

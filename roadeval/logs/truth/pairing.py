@@ -24,7 +24,7 @@ from roadeval.logs.files import first_names
 from roadeval.logs.messages.pictures import codec_of
 from roadeval.logs.settings import NS, LabelPlace
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader, median_period
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.runtime.sentence import Sentence
 
 REACH: Final = 4

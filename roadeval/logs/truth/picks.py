@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from roadeval.data import ROAD, Truth
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import first_names
-from roadeval.logs.truth.names import NamedLabels
+from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.runtime.documents import read_bounded, read_json
 
 PICK: Final = "pick.json"
@@ -88,11 +88,14 @@ class Picks:
             picks = TypeAdapter(cls).validate_python(read_json(read_bounded(path)))
         except (OSError, ValueError, ValidationError) as error:
             reason = str(error).partition("\n")[0]
-            raise LogError(f"{path}: damaged ({reason}); pick into a new folder") from error
+            raise LogError(
+                f"damaged ({reason})", where=path, remedy="pick into a new folder"
+            ) from error
         if problem := picks._contradiction():
             raise LogError(
-                f"{path}: not as roadeval pick writes it ({problem}): take the file as it was "
-                "written, or pick into a new folder"
+                f"not as roadeval pick writes it ({problem}): take the file as it was "
+                "written, or pick into a new folder",
+                where=path,
             )
         return picks
 
@@ -145,9 +148,10 @@ class Picks:
         others = [labels.labels[at].path for at, key in enumerate(keys) if key not in picked]
         if labels.by == "number" and others:
             raise LogError(
-                f"{labels.name}: {len(others)} of {len(keys)} labels have numbers of frames that "
-                f"were not picked ({first_names(others)}): give them the names of their images in "
-                f"{IMAGES}"
+                f"{len(others)} of {len(keys)} labels have numbers of frames that were not "
+                f"picked ({first_names(others)}): give them the names of their images in "
+                f"{IMAGES}",
+                where=labels.name,
             )
 
     def is_proposal(self, stamp_ns: int, truth: Truth) -> bool:

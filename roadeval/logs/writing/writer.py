@@ -84,7 +84,7 @@ class LogWriter:
         from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
         if format not in (formats := ("jpeg", "png", "webp")):
-            raise LogError(f"{topic}: format {format!r} is none of {', '.join(formats)}")
+            raise LogError(f"format {format!r} is none of {', '.join(formats)}", where=topic)
         message = CompressedImage(frame_id=frame_id, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
         data = message.SerializeToString(deterministic=True)
@@ -276,16 +276,16 @@ def pack(
     if images.is_dir():
         return _pack_folder(images, output, Path(masks) if masks else None, rate_hz)
     if images.suffix.lower() not in VIDEO_SUFFIXES or not images.is_file():
-        raise LogError(f"{images}: neither a folder of images nor a video")
+        raise LogError("neither a folder of images nor a video", where=images)
     if masks is not None:
-        raise LogError(f"{images}: masks go with a folder of images, not with a video")
+        raise LogError("masks go with a folder of images, not with a video", where=images)
     number, orientations = 0, set[int]()
     with LogWriter(output) as log:
         for number, (time_ns, jpeg) in enumerate(_read_frames(images, orientations), start=1):
             regular = 0 if rate_hz is None else round((number - 1) * NS / rate_hz)
             log.image(CAMERA, time_ns if rate_hz is None else regular, jpeg, "jpeg")
         if not number:
-            raise LogError(f"{images}: a video without frames")
+            raise LogError("a video without frames", where=images)
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
     matrix = "frames are turned as the video's display matrix asks; calibrations are of the sensor"
     return PackResult(output, number, 0, words, (matrix,) if orientations - {1} else ())
@@ -298,12 +298,12 @@ def _pack_folder(
     belong = images_of(labels, files)
     if labels and not belong:
         raise LogError(
-            f"{masks}: no mask has the name of an image in {images} ({first_names(labels)})"
+            f"no mask has the name of an image in {images} ({first_names(labels)})", where=masks
         )
     by_image: dict[Path, Path] = {}
     for label, image in belong.items():
         if (other := by_image.setdefault(image, label)) != label:
-            raise LogError(f"{masks}: {other.name} and {label.name} belong to the same image")
+            raise LogError(f"{other.name} and {label.name} belong to the same image", where=masks)
     in_order, times = order_by_time(files)
     if rate_hz is None and times is not None:
         files, words = in_order, "the times in the files' names"
@@ -335,15 +335,17 @@ def _list_labels(masks: Path, images: Path) -> Sequence[Path]:
     """List the label images for a folder of images; a `LogError` if there are none."""
     try:
         if masks.resolve() == images.resolve():
-            raise LogError(f"{masks}: the images themselves")
+            raise LogError("the images themselves", where=masks)
         return prefer_ids(list_files(masks, IMAGES))
     except LogError as error:
         if not masks.exists():
             raise
-        raise LogError(
-            f"{error}; labels of an annotation tool are for the packed log: pack without them, "
-            f"then roadeval replay LOG.mcap --truth {masks} --truth-images {images}"
-        ) from error
+        refused = LogError.of(error)
+        refused.remedy = (
+            "labels of an annotation tool are for the packed log: pack without them, then "
+            f"roadeval replay LOG.mcap --truth {masks} --truth-images {images}"
+        )
+        raise refused from error
 
 
 def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, bytes]]:
@@ -358,7 +360,7 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
     try:
         with av.open(str(video)) as container:
             if not container.streams.video:
-                raise LogError(f"{video}: it holds no video")
+                raise LogError("it holds no video", where=video)
             stream = container.streams.video[0]
             first: int | None = None
             for index, frame in enumerate(container.decode(stream)):
@@ -370,7 +372,7 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
                 _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, 95])
                 yield round((pts - first) * unit * NS), jpeg.tobytes()
     except (av.FFmpegError, OSError) as error:
-        raise LogError(f"{video}: not a readable video ({error.strerror})") from error
+        raise LogError(f"not a readable video ({error.strerror})", where=video) from error
 
 
 def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
@@ -382,11 +384,15 @@ def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
         format_ = format_of(data)
         assert format_ is not None
         if is_label and not format_.exact:
-            raise LogError(f"{file}: {format_.name} changes label values; masks must be lossless")
+            raise LogError(
+                f"{format_.name} changes label values", where=file, remedy="masks must be lossless"
+            )
         if format_.media_type is None:
-            raise LogError(f"{file}: {format_.name}, which not all viewers know: save it as PNG")
+            raise LogError(
+                f"{format_.name}, which not all viewers know: save it as PNG", where=file
+            )
         return data, format_.media_type.removeprefix("image/")
     except OSError as error:
-        raise LogError(f"{file}: {error.strerror}") from error
+        raise LogError(str(error.strerror), where=file) from error
     except ImageError as error:
         raise LogError.of(error, file) from error

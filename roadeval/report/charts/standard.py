@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -22,6 +22,7 @@ from roadeval.report.captions import caption
 from roadeval.report.chart import (
     BETTER,
     FAINT,
+    POINTS,
     WORSE,
     Chart,
     ChartKind,
@@ -74,6 +75,29 @@ def over_windows(
     return over_frames(windows.assign(frame=middles), rates, by_variant)
 
 
+def short_end(windows: pd.DataFrame, most: int = POINTS) -> tuple[int, float, float] | None:
+    """Return the frames of the last point, if they are fewer, and the numbers of both its ends.
+
+    ``windows`` are drawn as at most so many points, each the mean of neighbours.
+    """
+    spans = windows.groupby("window")[["first_frame", "last_frame", "frames"]].agg(
+        {"first_frame": "min", "last_frame": "max", "frames": "max"}
+    )
+    rows = -(-len(spans) // most)
+    last = spans.iloc[(len(spans) - 1) // rows * rows :]
+    if (frames := int(last["frames"].sum())) >= rows * spans["frames"].max():
+        return None
+    return frames, last["first_frame"].min() - 0.5, last["last_frame"].max() + 0.5
+
+
+def describe_points(windows: pd.DataFrame, most: int = POINTS) -> str:
+    """Return how many frames a point of a chart over the drive stands for, as a clause."""
+    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // most)
+    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    short = short_end(windows, most)
+    return f"each point is the mean of {point}{f', the last of {short[0]}' if short else ''}"
+
+
 def over_frames(
     frames: pd.DataFrame, rates: Sequence[str], by_variant: Mapping[str, Look] | None = None
 ) -> list[Chart]:
@@ -99,6 +123,16 @@ def over_frames(
             from_zero=rate in SIGNS or not METRICS[rate].higher_is_better,
         )
         for rate in rates
+    ]
+
+
+def ribbons(charts: Sequence[Chart]) -> list[Chart]:
+    """Return a low chart for each series of a chart along the drive, all with one axis."""
+    return [
+        replace(chart, title=series.name, series=[series], y_range=(0.0, max(most, 1.0)), low=True)
+        for chart in charts
+        for most in [max((y for s in chart.series for _, y in s.points()), default=1.0)]
+        for series in chart.series
     ]
 
 

@@ -33,13 +33,15 @@ from roadeval.report.blocks import (
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import place_chart, range_of_frames, values
+from roadeval.report.film import Film
 from roadeval.report.pdf.typeset import ReportError
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.runtime.files import put, writing
 from roadeval.runtime.text import visible
 
 _SCRIPTS: Final = (
-    *("tables.js", "choice.js", "charts.js", "places.js", "pictures.js", "frames.js", "start.js"),
+    *("tables.js", "choice.js", "charts.js", "places.js", "rates.js", "film.js", "pictures.js"),
+    *("frames.js", "start.js"),
 )
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
@@ -64,6 +66,7 @@ def page(document: Report) -> bytes:
             caption=caption,
             values=values,
             source=_source,
+            film_source=_film_source,
             rows_of=_rows,
             variants=variants,
             variant_of=partial(_variant_of, variants),
@@ -76,7 +79,7 @@ def page(document: Report) -> bytes:
 @cache
 def _policy() -> str:
     """Return the content security policy: it allows only the page's own parts."""
-    parts = "default-src 'none'; img-src data:; style-src {}; script-src {}"
+    parts = "default-src 'none'; img-src data:; media-src data:; style-src {}; script-src {}"
     own_parts = parts.format(_hash(style()), _hash(script()))
     return f"{own_parts}; base-uri 'none'; form-action 'none'"
 
@@ -130,6 +133,10 @@ def _source(image: ImageFile | bytes) -> str:
     image = ImageFile(image) if isinstance(image, bytes) else image
     media = _MEDIA[image.name.rpartition(".")[2]]
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
+
+
+def _film_source(film: Film) -> str:
+    return f"data:video/webm;base64,{base64.b64encode(film.content).decode()}"
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
-from roadeval.report.charts.standard import figures_over_drive
+from roadeval.report.charts.standard import describe_points, figures_over_drive
 from roadeval.report.findings import Findings
 from roadeval.report.images import example_grid, heat_map
 from roadeval.report.tables import (
@@ -33,8 +33,8 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import CLAIMED, correction
 
 
-def over_drive(findings: Findings) -> Iterator[Block]:
-    """Yield the paper's claims and figures of the drive."""
+def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
+    """Yield the paper's claims and figures of the drive, with or without a heading."""
     claims = findings.facts.claims
     rows = [
         [words, f"{claims[name]['held']} of {claims[name]['windows']}"]
@@ -44,24 +44,30 @@ def over_drive(findings: Findings) -> Iterator[Block]:
     blocks: list[Block] = []
     if rows:
         legend = caption("claims", window=findings.facts.evaluation.window)
-        blocks.append(Table(["claim", "borne out by"], rows, caption=legend))
+        blocks.append(Table(["claim", "true in"], rows, caption=legend))
     if findings.examples:
         blocks.append(example_grid(findings.examples, caption("figure 2")))
+    if len(findings.windows):
+        points = describe_points(findings.windows)
+        blocks.append(Text(f"Below, {points}.", "note"))
     blocks += [
         Figure(charts, figure.caption)
         for figure in figures_over_drive()
         if (charts := figure.charts(findings.windows))
     ]
-    if blocks:
+    if blocks and heading:
         yield Heading("Over the drive")
-        yield Details("The paper's claims, and its figures 2, 3a and 3b", blocks)
+    if blocks:
+        of_paper = "The paper's claims, and its figures 2, 3a and 3b"
+        yield Details(of_paper if rows else "Masks and rates along the drive", blocks)
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield the effects of the filter and the variants, and how much masks flicker."""
     effects = findings.facts.final_effects
     if effects:
-        yield Heading("What the filter and the variants change")
+        filter_too = "the filter and " * (FILTERED in findings.finals)
+        yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
         yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
     pairs = tables.changes(findings.table("frames"), FILTERED, UNFILTERED)
@@ -74,7 +80,8 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         for row in steps[steps["N"] > 0].to_dict("records"):  # a killed run has none
             yield Text(changed_pixels(row, int(pairs["wrong"].sum())))
         legend = caption("filter frame by frame", treated=FILTERED, control=UNFILTERED)
-        yield Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
+        figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
+        yield Details("The filter, frame by frame", [figure])
     yield from _over_time(findings)
 
 
@@ -115,7 +122,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
         rows.append(
             [
                 variant_cell(name, [*findings.finals]),
-                Cell(percent(flicker), bold=True),
+                percent(flicker),
                 percent(measured["truth_flicker"]),
                 points(flicker - measured["truth_flicker"]) if defined(flicker) else DASH,
                 *(number(measured[count]) for count in ("pairs", "episodes")),
@@ -156,10 +163,11 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     if not isinstance(findings, Findings):
         return
     trimaps = {n: m["trimap"] for n, m in findings.facts.beyond.items() if "trimap" in m}
-    if trimaps:
-        yield Figure([charts.trimap(trimaps)], caption("trimap"))
+    blocks: list[Block] = [Figure([charts.trimap(trimaps)], caption("trimap"))] if trimaps else []
     if findings.heatmaps:
-        yield _heat_maps(findings.heatmaps)
+        blocks.append(_heat_maps(findings.heatmaps))
+    if blocks:
+        yield Details("By distance from the road's edge, and by place in the image", blocks)
 
 
 def stages(findings: Findings) -> Iterator[Block]:
@@ -173,7 +181,7 @@ def stages(findings: Findings) -> Iterator[Block]:
             [
                 variant_cell(variant, [*findings.totals]),
                 *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
-                Cell(percent(findings.total(variant)[TESTED]), bold=True),
+                percent(findings.total(variant)[TESTED]),
             ]
             for variant, parts in findings.error_parts.items()
         ],
@@ -206,7 +214,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
                 variant_cell(row["variant"], [*findings.totals]),
                 f"perfect {row['oracle']}",
                 percent(row["as_is"]),
-                Cell(percent(row[TESTED]), bold=True),
+                percent(row[TESTED]),
                 points(row[TESTED] - row["as_is"]),
                 *(percent(row[name]) for name in OTHERS),
                 number(row["frames"]),

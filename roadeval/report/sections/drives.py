@@ -19,7 +19,7 @@ from roadeval.results.facts import StratumFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
-from roadeval.results.sentences import MARK, is_significant, marked_interval
+from roadeval.results.sentences import MARK, marked_interval
 from roadeval.runtime.text import elide
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "group": rows["group"].astype(object).fillna("").tolist(),
         "tags": [tags.get(drive, "") for drive in rows.index],
         "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
-        **{r: [Cell(percent(rate), bold=r == TESTED) for rate in scores[r]] for r in _SHOWN},
+        **{rate: [*map(percent, scores[rate])] for rate in _SHOWN},
         **{
             f"against {base}": [*map(points, changes.reindex(rows.index))]
             for base, changes in _differences(findings).items()
@@ -202,7 +202,7 @@ def _part_cells(part: StratumFacts) -> list[Cell | str]:
     return [
         part.value,
         number(change.units),
-        Cell(points(change.mean), bold=is_significant(change)),
+        points(change.mean),
         marked_interval(change),
         *(number(count or 0) for count in (change.worse, change.better)),
     ]
@@ -245,7 +245,7 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
                 str(row["rank"]),
                 findings.names[row["drive"]],
                 str(row["frame"]),
-                Cell(percent(row[TESTED]), bold=True),
+                percent(row[TESTED]),
                 findings.inspect(row),
             ]
             for row in rows

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
 
-from roadeval.data import BASELINE
+from roadeval.data import ERRORS
+from roadeval.data.arrays import Sums
 from roadeval.data.words import in_percent, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS
@@ -23,13 +24,13 @@ from roadeval.report.blocks import (
     Text,
     TwoColumns,
 )
-from roadeval.report.captions import caption, note
+from roadeval.report.captions import caption, captions, note
 from roadeval.report.chart import Chart
+from roadeval.report.film import Film
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.tables import variant_cell
 from roadeval.results.sentences import step_by_step, without_filter
-from roadeval.results.verdict import focus_of
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -41,7 +42,7 @@ MOST: Final = 6
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, and the frames that the filter changed most."""
-    focus = focus_of(findings.finals)
+    focus = findings.facts.focus
     if focus is None:
         if (doubt := findings.facts.unlabelled) and doubt.sign:
             meaning = SIGNS[doubt.sign]
@@ -129,11 +130,40 @@ def _notes(frame: NotableFrame) -> list[str]:
     return without_filter(frame.notes) if len(frame.parts) > 1 else [*frame.notes]
 
 
+SCRIPT_WORDS: Final = (
+    "verdict of a range",
+    "error of a range",
+    "worst frame",
+    "rates of a threshold",
+)
+"""Captions that the script of a page fills in."""
 LARGE_ON_PAGE: Final = 640
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
 """Most frames in the table; the table of a longer drive has those with the highest ERR."""
+
+
+@dataclass(frozen=True, eq=False)
+class ThresholdSlider:
+    """A threshold on how probable road is, which a page can move."""
+
+    variant: str
+    stage: str
+    now: float
+    """The threshold of the run, from 0 to 1."""
+    line: str
+    """The lines of a configuration that set it to ``{}``."""
+    counts: Sequence[int]
+    """TP, TN, FP and FN of the stage's masks in the run."""
+    levels: Sums
+    """``(2, 256)``: labelled pixels of the drive by level, non-road and road."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return all that the script needs."""
+        other, road = self.levels.tolist()
+        words = {"stage": self.stage, "now": self.now, "line": self.line}
+        return {**words, "counts": [*self.counts], "other": other, "road": road}
 
 
 @dataclass(frozen=True)
@@ -150,10 +180,40 @@ class FrameBrowser(Block):
     """The command that opens frame ``{}`` in the viewer; empty without a recording."""
     strips: Sequence[Strip] = ()
     """Frames with their pictures, in order."""
-    masks: Sequence[str] = ()
-    """Names of the pictures of final masks, which are compared if there is no truth."""
     titles: Sequence[str] = ()
     """The rates, or without truth the signs of doubt, with a column for each variant."""
+    ribbons: Sequence[Chart] = ()
+    """The first rate along the drive, a low chart for each variant."""
+    film: Film | None = None
+    """The video of the drive; None without a recording."""
+    counts: Mapping[str, Mapping[int, Sequence[int]]] = field(default_factory=dict)
+    """TP, TN, FP and FN of each variant's final mask, by frame."""
+    focus: str = ""
+    verdicts: Mapping[str, str] = field(default_factory=dict)
+    """The verdict on each variant, if it is the focus."""
+    worst: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    """Each variant's worst frames, one a scene."""
+    thresholds: Sequence[ThresholdSlider] = ()
+    """The thresholds that can be moved."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what the script of a page needs."""
+        numbers = [row.frame for row in self.rows]
+        return {
+            "frames": numbers,
+            "counts": {
+                name: [by_frame.get(number) for number in numbers]
+                for name, by_frame in self.counts.items()
+            },
+            "variants": [*self.variants],
+            "focus": self.focus,
+            "verdicts": {**self.verdicts},
+            "worst": {**self.worst},
+            "thresholds": {slider.variant: slider.as_json() for slider in self.thresholds},
+            "film": self.film and self.film.as_json(),
+            "colours": [label.rgba for label in ERRORS.classes],
+            "words": {name: captions()[name] for name in SCRIPT_WORDS},
+        }
 
     @property
     def pictured(self) -> frozenset[int]:
@@ -189,16 +249,8 @@ class FrameBrowser(Block):
         return max(pictured, key=lambda row: row.error).frame if pictured else None
 
     @property
-    def compared(self) -> tuple[str, str]:
-        """The two pictures that lie over each other: errors of two variants, or their masks."""
-        scored = self.variants if TESTED in self.titles else ()
-        errors = [f"{name}: errors" for name in scored if name != BASELINE]
-        first, *others = errors or [*self.masks] or ["camera"]
-        return first, next(iter(others), "camera")
-
-    @property
     def note(self) -> str:
-        """Sentences on the frames that the table leaves out, its unit, and missing pictures."""
+        """Sentences on the frames that the table, or the video, leaves out."""
         sentences, frames = [], number(len(self.rows))
         if (shown := len(self.shown)) < len(self.rows):
             file = "frames" if TESTED in self.titles else "unlabelled"
@@ -206,10 +258,8 @@ class FrameBrowser(Block):
             sentences.append(
                 caption("frames in the table", shown=count, all=frames, rate=rate, file=file)
             )
-        if self.variants:
-            sentences.append("Percent.")
-        if 0 < len(self.strips) < len(self.rows):
-            sentences.append(caption("pictured frames", pictured=len(self.strips), all=frames))
+        if self.film and len(self.film.frames) < len(self.rows):
+            sentences.append(caption("filmed frames", filmed=len(self.film.frames), all=frames))
         return " ".join(sentences)
 
 

@@ -54,7 +54,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
         title = f"First frame to look at: {frame.frame}"
         if frame.rates:
             wrong = percent(frame.rates[frame.variant][TESTED], 1)
-            title = f"Worst frame: {frame.frame}, where {frame.variant} gets {wrong} % wrong"
+            title = caption("worst frame", frame=frame.frame, variant=frame.variant, ERR=wrong)
         command = findings.inspect(frame.frame) if findings.inspect else ""
         yield LinkList([(title, f"#frame-{frame.frame}")], command)
     if findings.totals:

@@ -41,6 +41,14 @@ def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
     assert choose_image([depth], None)[0].name == "/cam/depth"
 
 
+def test_a_topic_that_is_not_there_is_guessed_among_those_of_its_kind() -> None:
+    topics = [camera("/cam/left"), label("/labels/semantic")]
+    with pytest.raises(LogError, match=r"mean /cam/left\? its camera topics are: /cam/left$"):
+        choose_image(topics, "/cam")
+    with pytest.raises(LogError, match=r"its label topics are: /labels/semantic$"):
+        choose_truth(topics, topics[0], "/truth", LabelSettings())
+
+
 @pytest.mark.parametrize(
     ("names", "chosen"),
     [

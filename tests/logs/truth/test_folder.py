@@ -12,9 +12,9 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import MaskSettings
-from roadeval.logs.truth.beside import labels_in, npy_picture
-from roadeval.logs.truth.labels import Confidence, log_and_topic
-from roadeval.logs.truth.names import NamedLabels, find_keys
+from roadeval.logs.truth.label_files import labels_in, npy_picture
+from roadeval.logs.truth.meaning import Confidence, log_and_topic
+from roadeval.logs.truth.named_labels import NamedLabels, find_keys
 from roadeval.logs.truth.picks import Picked, Picks, Why
 from tests.logs.making import png
 

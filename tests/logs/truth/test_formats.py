@@ -18,10 +18,10 @@ from roadeval.data import ROAD
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import LabelSettings
-from roadeval.logs.truth.beside import labels_in
-from roadeval.logs.truth.drawn import Outline, Proposal, Runs
 from roadeval.logs.truth.formats.coco import as_coco, lengths_in
-from roadeval.logs.truth.labels import understand_classes
+from roadeval.logs.truth.label_files import labels_in
+from roadeval.logs.truth.meaning import find_class_meaning
+from roadeval.logs.truth.shapes import Outline, Proposal, Runs
 from tests.logs.truth.test_folder import opened
 
 LABELS = Path(__file__).parents[2] / "fixtures" / "labels"
@@ -101,7 +101,7 @@ def test_rectangles_of_x_anylabeling_may_be_turned():
 
 def test_what_no_shape_covers_is_non_road():
     values, origin = values_of(LABELS / "labelme")
-    meaning = understand_classes(LabelSettings(road=("road",)), origin, "labels")
+    meaning = find_class_meaning(LabelSettings(road=("road",)), origin, "labels")
     np.testing.assert_array_equal(meaning.of_values(values[0]) == 1, WHOLE[0] == "road")
 
 
@@ -116,16 +116,16 @@ def test_what_no_shape_covers_is_non_road():
 def test_a_class_that_does_not_occur_is_refused_with_the_list(labels, setting, problem):
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
     with pytest.raises(LogError, match=re.escape(problem)) as refused:
-        understand_classes(labels, origin, "labels")
+        find_class_meaning(labels, origin, "labels")
     assert refused.value.setting == setting
     with pytest.raises(LogError, match=r"ego \(1 label\); 2 labels of it cannot be read"):
-        understand_classes(LabelSettings(("Road",)), replace(origin, lost=2), "labels")
+        find_class_meaning(LabelSettings(("Road",)), replace(origin, lost=2), "labels")
 
 
 def test_a_lone_class_called_road_needs_no_naming():
     origin = labels_in(LABELS / "cvat" / "annotations.xml", SIZE)
     lone = replace(origin, classes={"road": origin.classes["road"]})
-    meaning = understand_classes(LabelSettings(), lone, "labels")
+    meaning = find_class_meaning(LabelSettings(), lone, "labels")
     assert meaning.words == "road is road"
     assert meaning.meaning[lone.classes["road"]] == ROAD
 

@@ -15,16 +15,16 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.settings import LabelSettings, MaskSettings
-from roadeval.logs.truth.beside import file_label
-from roadeval.logs.truth.labels import count_values, meaning_of, understand
-from roadeval.logs.truth.names import LabelSet, find_keys
+from roadeval.logs.truth.label_files import file_label
+from roadeval.logs.truth.meaning import count_values, find_meaning, meaning_of
+from roadeval.logs.truth.named_labels import LabelSet, find_keys
 from tests.logs.making import grey, jpeg, png
 
 LIMITS = Limits()
 
 
 def truth(values: list[int], labels: LabelSettings | None = None) -> list[int]:
-    table = understand(labels or LabelSettings(), [values], "/labels")
+    table = find_meaning(labels or LabelSettings(), [values], "/labels")
     return table.of_values(np.array([values], np.uint8))[0].tolist()
 
 
@@ -52,8 +52,8 @@ def test_a_mask_is_understood_by_itself_and_other_values_as_they_are_named(
 def test_values_that_mean_road_in_some_pictures_and_ignored_in_others_are_asked_for(pictures):
     """Two annotators' labels in one folder: 255 would be ignored in half of them."""
     with pytest.raises(LogError, match=r"/mask holds the values 0 1 255; 255 is road in masks of"):
-        understand(LabelSettings(), pictures, "/mask")
-    meaning = understand(LabelSettings(road=(1, 255)), pictures, "/mask")
+        find_meaning(LabelSettings(), pictures, "/mask")
+    meaning = find_meaning(LabelSettings(road=(1, 255)), pictures, "/mask")
     assert meaning.of_values(np.array([[0, 1, 255]], np.uint8)).tolist() == [[0, 1, 1]]
 
 
@@ -67,7 +67,7 @@ def test_values_that_mean_road_in_some_pictures_and_ignored_in_others_are_asked_
 def test_a_picture_whose_values_mean_something_else_than_those_looked_at_is_no_label(
     values, other, problem
 ):
-    table = understand(LabelSettings(), [values], "/mask")
+    table = find_meaning(LabelSettings(), [values], "/mask")
     with pytest.raises(BadMessage, match=problem):
         table.of_values(np.array([other], np.uint8))
     assert table.of_values(np.array([[*values]], np.uint8)).tolist() == [[0, 1]]
@@ -120,7 +120,7 @@ ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
 def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
     labels = LabelSettings(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
-    table = understand(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
+    table = find_meaning(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
 
@@ -136,7 +136,7 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
     assert to_labels(picture, LIMITS).tolist() == [[0, 1, 2]]
     labels = LabelSettings(road_colors=(ROAD,))
-    table = understand(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
+    table = find_meaning(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[0, 1, 0]]
 
 
@@ -146,7 +146,7 @@ def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelS
     with pytest.raises(LogError, match=r"/labels is JPEG, .*: log labels as PNG"):
         count_values(picture, labels, "/labels", LIMITS)
     with pytest.raises(BadMessage, match="a JPEG, whose compression changes label values"):
-        understand(labels, [[0, 255]], "/labels").read(picture, LIMITS)
+        find_meaning(labels, [[0, 255]], "/labels").read(picture, LIMITS)
 
 
 def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(tmp_path):

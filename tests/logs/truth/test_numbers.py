@@ -18,7 +18,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.settings import LabelPlace, LogConfig, MaskSettings
 from roadeval.logs.topics.choose import check_names
 from roadeval.logs.topics.reader import TopicInfo
-from roadeval.logs.truth.names import LabelSet, NamedLabel, find_keys
+from roadeval.logs.truth.named_labels import LabelSet, NamedLabel, find_keys
 from tests.fixtures import broken
 from tests.fixtures.broken import (
     FRAMES,

@@ -6,9 +6,9 @@ import pytest
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.settings import LabelSettings, MaskSettings
-from roadeval.logs.truth.beside import labels_in
-from tests.logs.truth.test_beside import coco, written
+from roadeval.logs.truth.label_files import labels_in
 from tests.logs.truth.test_formats import HEIGHT, SIZE, WIDTH, inside
+from tests.logs.truth.test_label_files import coco, written
 
 SQUARE = [[10, 10], [20, 10], [20, 20], [10, 20]]
 

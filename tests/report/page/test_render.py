@@ -41,7 +41,7 @@ MARKS = Chart("ERR", ChartKind.MARKS, CHART.series, names=[HOSTILE, "b"], share=
 
 def every_block(text):
     """One of each kind of block, with a text wherever one has room."""
-    table = Table([text, "n"], [[Cell(text, dot="#0072B2"), text], ["", "1"]], caption=text)
+    table = Table([text, "n"], [[Cell(text, look=Look("#0072B2")), text], ["", "1"]], caption=text)
     strip = Strip(7, [text], table, [[Picture(text, text, JPEG)]], text)
     row = NotableFrame(7, 0, "", {text: {"ERR": 0.01}}, notes=[text], conditions=[text])
     return [

@@ -113,3 +113,12 @@ def parts(element):
     for each in inner if isinstance(inner, list) else [inner]:
         if hasattr(each.get_object(), "keys") and "/S" in each.get_object():
             yield from parts(each)
+
+
+def test_many_rows_of_pictures_fill_a_page_and_go_on_with_their_caption_above():
+    grid = ImageGrid([(f"picture {n}", a_png()) for n in range(12)], 2, caption="Frames.")
+    pages = reader(typeset(a_document(Heading("Masks"), grid))).pages
+    first, *_, last = (page.extract_text() for page in pages)
+    assert first.index("Frames.") < first.index("picture 0")
+    assert "picture 11" in last
+    assert "picture 11" not in first

@@ -11,7 +11,9 @@ import pytest
 from roadeval.data import ERRORS
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.report.blocks import (
+    Cell,
     Command,
+    Details,
     Figure,
     Heading,
     KeepTogether,
@@ -21,6 +23,7 @@ from roadeval.report.blocks import (
     plain,
 )
 from roadeval.report.captions import caption
+from roadeval.report.charts import standard as charts
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
@@ -28,7 +31,7 @@ from roadeval.report.sections.drive import filter_effect, regions, thresholds
 from roadeval.report.sections.frames import FrameBrowser, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
 from roadeval.report.sections.summary import warnings
-from roadeval.report.tables import rates_table
+from roadeval.report.tables import differences_table, rates_table, stages_table
 from roadeval.results.facts import TrainingFacts
 from roadeval.results.tables import read_table
 from tests.evaluation.making import a_table
@@ -124,8 +127,8 @@ def of_regions(*regions, variants=VARIANTS):
 def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near():
     beyond = {name: {"trimap": {"1": [0, 0], "8": [3, 12]}} for name in VARIANTS[:2]}
     findings = some_findings(regions=of_regions("boundary", "interior"), beyond=beyond)
-    _, figure = (block for block in regions(findings) if isinstance(block, Figure))
-    (chart,) = figure.charts
+    (details,) = (block for block in regions(findings) if isinstance(block, Details))
+    (chart,) = details.blocks[0].charts
     assert chart.names == ["1", "8"]
     assert [each.name for each in chart.series] == ["filtered", "unfiltered"]
     assert [*chart.series[0].points()] == [(1, 25)]
@@ -257,3 +260,18 @@ def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
     assert set(windows["frames"][:-1]) == {size}
     assert len(windows) == rows
     assert windows["frames"].sum() == frames
+
+
+def test_a_variant_has_one_mark_in_tables_and_charts():
+    findings = some_findings()
+    marks = {row[0].text: row[0].look for row in rates_table(findings.facts).rows}
+    for chart in charts.stages(findings.totals):
+        assert {series.name: series.look for series in chart.series} == marks
+
+
+def test_bold_is_the_best_and_nothing_else():
+    effect = Effect("unfiltered", "filtered", "post", True, by_rate(err=a_difference(-0.02)))
+    facts = some_findings(effects=[effect]).facts
+    tables = stages_table(facts.totals), differences_table(facts)
+    cells = [cell for table in tables for row in table.rows for cell in row]
+    assert [cell for cell in cells if isinstance(cell, Cell) and cell.bold] == []

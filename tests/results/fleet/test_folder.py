@@ -150,15 +150,17 @@ def test_a_tag_may_be_called_as_a_column_is(tmp_path):
     assert {part.tag for part in finished(folder, tagged).strata} == {"camera"}
 
 
+@pytest.fixture(scope="module")
+def pictured(tmp_path_factory):
+    """A fleet with pictures, and what its tables are summed up to."""
+    folder = fleet_of(tmp_path_factory.mktemp("pictured") / "f", 2, pictures=2)
+    return folder, finished(folder)
+
+
 @pytest.mark.parametrize("table", ["frames", "regions", "scores", "worst"])
-@pytest.mark.parametrize("left", [b"", b"PAR1"])
-def test_a_cached_table_that_is_missing_or_damaged_is_made_anew(tmp_path, table, left):
-    folder = fleet_of(tmp_path / "f", 3, pictures=3)
-    before = finished(folder)
-    path = next((folder / table).rglob("*.parquet"))
-    path.unlink()
-    if left:
-        path.write_bytes(left)
+def test_a_cached_table_that_is_damaged_is_made_anew(pictured, tmp_path, table):
+    folder, before = shutil.copytree(pictured[0], tmp_path / "f"), pictured[1]
+    next((folder / table).rglob("*.parquet")).write_bytes(b"PAR1")
     assert finished(folder) == before
     assert len(FleetFolder(folder).table(table))
 

@@ -6,22 +6,22 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 
 def _read_cityscapes(
-    path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.DrawnLabel]:
-    shapes = (
-        drawn.Outline(area["label"], drawn.flatten(area["polygon"]))
+    path: Path, content: Mapping[str, Any], _: shapes.Size | None
+) -> Iterator[shapes.DrawnLabel]:
+    polygons = (
+        shapes.Outline(area["label"], shapes.flatten(area["polygon"]))
         for area in content["objects"]
         if not area.get("deleted")
     )
-    yield drawn.DrawnLabel(str(path), drawn.size_in(content, "imgWidth", "imgHeight"), shapes)
+    yield shapes.DrawnLabel(str(path), shapes.size_in(content, "imgWidth", "imgHeight"), polygons)
 
 
 FORMATS: Final = (
-    drawn.LabelFormat(
-        "Cityscapes", ".json", drawn.has_keys("imgWidth", "imgHeight", "objects"), _read_cityscapes
+    shapes.LabelFormat(
+        "Cityscapes", ".json", shapes.has_keys("imgWidth", "imgHeight", "objects"), _read_cityscapes
     ),
 )

@@ -11,12 +11,12 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 
 def _read_coco(
-    path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.DrawnLabel]:
+    path: Path, content: Mapping[str, Any], _: shapes.Size | None
+) -> Iterator[shapes.DrawnLabel]:
     categories = _by_id(path, "category", content["categories"])
     names = {number: str(category["name"]) for number, category in categories.items()}
     images = _by_id(path, "image", content["images"])
@@ -30,9 +30,9 @@ def _read_coco(
     for number in annotations.keys() - images.keys():
         raise LogError(f"annotations are of image {number}, which is not listed", where=path)
     for number, image in images.items():
-        size = drawn.size_in(image)
-        shapes = _shapes(annotations[number], names, size)
-        yield drawn.DrawnLabel(str(image["file_name"]), size, shapes)
+        size = shapes.size_in(image)
+        outlines = _shapes(annotations[number], names, size)
+        yield shapes.DrawnLabel(str(image["file_name"]), size, outlines)
 
 
 def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[Any, Any]:
@@ -50,8 +50,8 @@ def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[A
 
 
 def _shapes(
-    annotations: Iterable[Mapping[str, Any]], names: Mapping[Any, str], size: drawn.Size | None
-) -> Iterator[drawn.Shape]:
+    annotations: Iterable[Mapping[str, Any]], names: Mapping[Any, str], size: shapes.Size | None
+) -> Iterator[shapes.Shape]:
     for annotation in annotations:
         if (label := names.get(annotation["category_id"])) is None:
             raise BadMessage(f"an annotation of category {annotation['category_id']}, not listed")
@@ -59,24 +59,24 @@ def _shapes(
             case {"counts": counts, **rest}:
                 yield run_lengths(label, counts, rest.get("size"), size)
             case [[*_], *_] as rings if any(rings):
-                yield from (drawn.Outline(label, ring) for ring in rings if ring)
+                yield from (shapes.Outline(label, ring) for ring in rings if ring)
             case None | [] | [[]]:
                 left, top, width, height = annotation.get("bbox") or (0, 0, 0, 0)
                 corners = left, top, left + width, top + height
-                box = drawn.rectangle(label, *corners) if width else None
-                yield drawn.Undrawn(label, "box without an outline", box)
+                box = shapes.rectangle(label, *corners) if width else None
+                yield shapes.Undrawn(label, "box without an outline", box)
             case other:
-                yield drawn.Outline(label, other)
+                yield shapes.Outline(label, other)
 
 
-def run_lengths(label: str, counts: Any, stated: Any, size: drawn.Size | None) -> drawn.Runs:
+def run_lengths(label: str, counts: Any, stated: Any, size: shapes.Size | None) -> shapes.Runs:
     """Return an area of runs; ``stated`` is the height and width beside them, if any."""
     if size is not None and stated is not None and (stated[1], stated[0]) != size:
         raise BadMessage(
             f"a mask of {label} that is {stated[1]}x{stated[0]}, on an image of {size[0]}x{size[1]}"
         )
     lengths = lengths_in(counts) if isinstance(counts, str) else counts
-    return drawn.Runs(label, lengths, by_columns=True)
+    return shapes.Runs(label, lengths, by_columns=True)
 
 
 def lengths_in(text: str) -> Sequence[int]:
@@ -100,7 +100,7 @@ def lengths_in(text: str) -> Sequence[int]:
     return lengths
 
 
-def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
+def as_coco(proposals: Sequence[shapes.Proposal]) -> dict[str, bytes]:
     """Return one file by its name, with a region of uncompressed runs for each image."""
     images, annotations = [], []
     for number, proposal in enumerate(proposals, 1):
@@ -122,7 +122,7 @@ def as_coco(proposals: Sequence[drawn.Proposal]) -> dict[str, bytes]:
 
 
 FORMATS: Final = (
-    drawn.LabelFormat(
-        "COCO", ".json", drawn.has_keys("images", "annotations", "categories"), _read_coco
+    shapes.LabelFormat(
+        "COCO", ".json", shapes.has_keys("images", "annotations", "categories"), _read_coco
     ),
 )

@@ -8,17 +8,17 @@ from typing import Final
 from xml.etree.ElementTree import Element
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 
-def _read_cvat(path: Path, content: Element, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
+def _read_cvat(path: Path, content: Element, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
     if content.find("track") is not None:
         raise LogError("tracks of a video", where=path, remedy="export it as CVAT for images")
     for image in content.iter("image"):
-        yield drawn.DrawnLabel(image.attrib["name"], drawn.size_in(image.attrib), _shapes(image))
+        yield shapes.DrawnLabel(image.attrib["name"], shapes.size_in(image.attrib), _shapes(image))
 
 
-def _shapes(elements: Iterable[Element]) -> Iterator[drawn.Shape]:
+def _shapes(elements: Iterable[Element]) -> Iterator[shapes.Shape]:
     # Shapes of equal height stay in the order of the file. Datumaro writes shapes ``outside``, too.
     without_area = ("polyline", "points", "tag", "skeleton")
     for element in sorted(elements, key=lambda shape: float(shape.get("z_order", 0))):
@@ -26,34 +26,34 @@ def _shapes(elements: Iterable[Element]) -> Iterator[drawn.Shape]:
             yield _shape(element)
 
 
-def _shape(element: Element) -> drawn.Shape:
+def _shape(element: Element) -> shapes.Shape:
     label, at = element.attrib["label"], element.attrib
     degrees = float(at.get("rotation", 0))
     match element.tag:
         case "polygon":
             points = at["points"].replace(";", ",").split(",")
-            return drawn.Outline(label, [*map(float, points)])
+            return shapes.Outline(label, [*map(float, points)])
         case "box":
             left, top, right, bottom = (float(at[name]) for name in ("xtl", "ytl", "xbr", "ybr"))
-            box = drawn.rectangle(label, left, top, right, bottom)
+            box = shapes.rectangle(label, left, top, right, bottom)
             return box.rotate(degrees, ((left + right) / 2, (top + bottom) / 2))
         case "ellipse":
             x, y, across, down = (float(at[name]) for name in ("cx", "cy", "rx", "ry"))
-            return drawn.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
+            return shapes.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
         case "cuboid":
             corners = [side + end for side in ("tl", "bl", "tr", "br") for end in "12"]
             points = [at[axis + corner] for corner in corners for axis in "xy"]
-            return drawn.hull(label, [*map(float, points)])
+            return shapes.hull(label, [*map(float, points)])
         case "mask":
             left, top, width, height = (int(at[n]) for n in ("left", "top", "width", "height"))
             lengths = [int(number) for number in at["rle"].split(",")]
-            return drawn.Runs(label, lengths, (left, top, width, height))
+            return shapes.Runs(label, lengths, (left, top, width, height))
         case other:
-            return drawn.Undrawn(label, other)
+            return shapes.Undrawn(label, other)
 
 
 FORMATS: Final = (
-    drawn.LabelFormat(
+    shapes.LabelFormat(
         "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _read_cvat
     ),
 )

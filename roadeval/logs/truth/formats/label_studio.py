@@ -18,7 +18,7 @@ import numpy as np
 from roadeval.images.decoding import to_labels
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 _UPLOADED: Final = re.compile(r"^[0-9a-f]{8}-(?=.)")
 """The hash that an upload adds before an image's name."""
@@ -34,11 +34,11 @@ def _is_label_studio(_: Path, content: Any) -> bool:
 
 
 def _read_label_studio(
-    _: Path, content: list[Mapping[str, Any]], size: drawn.Size | None
-) -> Iterator[drawn.DrawnLabel]:
+    _: Path, content: list[Mapping[str, Any]], size: shapes.Size | None
+) -> Iterator[shapes.DrawnLabel]:
     # An image may be in several tasks, and merged projects may have two tasks of one number.
     tasks: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
-    sizes: dict[str, drawn.Size | None] = {}
+    sizes: dict[str, shapes.Size | None] = {}
     for task in content:
         annotations = task.get("annotations", [task]) or []
         regions: list[Mapping[str, Any]] = []
@@ -46,10 +46,10 @@ def _read_label_studio(
             regions = [region for annotation in annotations for region in _regions(annotation)]
         image = _image(task, regions)
         tasks[image] += annotations
-        stated = (drawn.size_in(r, "original_width", "original_height") for r in regions)
+        stated = (shapes.size_in(r, "original_width", "original_height") for r in regions)
         sizes[image] = sizes.get(image) or next(filter(None, stated), None)
     for image, annotations in tasks.items():
-        yield drawn.DrawnLabel(image, sizes[image], _shapes(annotations, sizes[image] or size))
+        yield shapes.DrawnLabel(image, sizes[image], _shapes(annotations, sizes[image] or size))
 
 
 def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -87,8 +87,8 @@ def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str
 
 
 def _shapes(
-    annotations: Sequence[Mapping[str, Any]], size: drawn.Size | None
-) -> Iterator[drawn.Shape]:
+    annotations: Sequence[Mapping[str, Any]], size: shapes.Size | None
+) -> Iterator[shapes.Shape]:
     valid = [annotation for annotation in annotations if not annotation.get("was_cancelled")]
     valid = [valid[0]] if len(valid) == 1 else [a for a in valid if a.get("ground_truth")] or valid
     if len(valid) > 1:
@@ -107,7 +107,7 @@ def _shapes(
             yield _shape(region, size)
 
 
-def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
+def _shape(region: Mapping[str, Any], size: shapes.Size | None) -> shapes.Shape:
     named = [v for k, v in region.items() if k.endswith("labels") and isinstance(v, list)]
     labels = [label for values in named for label in values]
     if len(labels) != 1:
@@ -123,21 +123,21 @@ def _shape(region: Mapping[str, Any], size: drawn.Size | None) -> drawn.Shape:
         return _brushed(label, region["rle"], size)
     if "imageDataURL" in region:
         pixels = to_labels(b64decode(region["imageDataURL"].partition(",")[2]), Limits())
-        return drawn.runs_of(label, pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
+        return shapes.runs_of(label, pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
     if "points" in region:
-        return drawn.Outline(
-            label, drawn.flatten((x * across, y * down) for x, y in region["points"])
+        return shapes.Outline(
+            label, shapes.flatten((x * across, y * down) for x, y in region["points"])
         )
     x, y = region["x"] * across, region["y"] * down
     if "radiusX" in region:
         across, down = region["radiusX"] * across, region["radiusY"] * down
-        return drawn.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
+        return shapes.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
     right, bottom = x + region["width"] * across, y + region["height"] * down
     # A rectangle turns about its first corner.
-    return drawn.rectangle(label, x, y, right, bottom).rotate(degrees, (x, y))
+    return shapes.rectangle(label, x, y, right, bottom).rotate(degrees, (x, y))
 
 
-def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs:
+def _brushed(label: str, numbers: Sequence[int], size: shapes.Size) -> shapes.Runs:
     """Return an area that was painted with the brush.
 
     The bytes are a stream of bits: 32 for the number of values, four a pixel; 5 for the width of a
@@ -168,7 +168,9 @@ def _brushed(label: str, numbers: Sequence[int], size: drawn.Size) -> drawn.Runs
     if start != total:
         raise BadMessage(f"a mask of {label} that does not fit its image")
     # A pixel at the edge belongs to the area if it is opaque by more than a half.
-    return drawn.runs_of(label, values.reshape(size[1], size[0], 4)[..., 3] > 127)
+    return shapes.runs_of(label, values.reshape(size[1], size[0], 4)[..., 3] > 127)
 
 
-FORMATS: Final = (drawn.LabelFormat("Label Studio", ".json", _is_label_studio, _read_label_studio),)
+FORMATS: Final = (
+    shapes.LabelFormat("Label Studio", ".json", _is_label_studio, _read_label_studio),
+)

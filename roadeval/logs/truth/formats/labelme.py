@@ -10,41 +10,41 @@ from typing import Any, Final
 
 from roadeval.images.decoding import to_rgb
 from roadeval.images.formats import Limits
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "quadrilateral")
 
 
 def _read_labelme(
-    path: Path, content: Mapping[str, Any], _: drawn.Size | None
-) -> Iterator[drawn.DrawnLabel]:
+    path: Path, content: Mapping[str, Any], _: shapes.Size | None
+) -> Iterator[shapes.DrawnLabel]:
     lines = ("point", "points", "line", "linestrip")
     areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in lines)
-    size = drawn.size_in(content, "imageWidth", "imageHeight")
-    yield drawn.DrawnLabel(str(path), size, map(_shape, areas))
+    size = shapes.size_in(content, "imageWidth", "imageHeight")
+    yield shapes.DrawnLabel(str(path), size, map(_shape, areas))
 
 
-def _shape(shape: Mapping[str, Any]) -> drawn.Shape:
-    label, points = shape["label"], drawn.flatten(shape["points"])
+def _shape(shape: Mapping[str, Any]) -> shapes.Shape:
+    label, points = shape["label"], shapes.flatten(shape["points"])
     match shape.get("shape_type") or "polygon", points:
         case "rectangle", [left, top, right, bottom]:
-            return drawn.rectangle(label, left, top, right, bottom)
+            return shapes.rectangle(label, left, top, right, bottom)
         case kind, [_, _, _, _, _, _, *_] if kind in _CORNERS:
-            return drawn.Outline(label, points)
+            return shapes.Outline(label, points)
         case "circle", [x, y, edge_x, edge_y]:
             radius = math.hypot(edge_x - x, edge_y - y)
-            return drawn.ellipse(label, x, y, radius, radius)
+            return shapes.ellipse(label, x, y, radius, radius)
         case "cuboid", [_, _, _, _, _, _, *_]:
-            return drawn.hull(label, points)
+            return shapes.hull(label, points)
         case "mask", [left, top, _, _]:
             pixels = to_rgb(b64decode(shape["mask"]), Limits())[..., 0] > 0
-            return drawn.runs_of(label, pixels, int(left), int(top))
+            return shapes.runs_of(label, pixels, int(left), int(top))
         case other, _:
-            return drawn.Undrawn(label, f"{other} of {len(points) // 2} points")
+            return shapes.Undrawn(label, f"{other} of {len(points) // 2} points")
 
 
 FORMATS: Final = (
-    drawn.LabelFormat(
-        "LabelMe", ".json", drawn.has_keys("shapes", "imageWidth", "imageHeight"), _read_labelme
+    shapes.LabelFormat(
+        "LabelMe", ".json", shapes.has_keys("shapes", "imageWidth", "imageHeight"), _read_labelme
     ),
 )

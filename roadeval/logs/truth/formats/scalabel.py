@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 from roadeval.logs.truth.formats.coco import run_lengths
 
 _STEPS: Final = np.linspace(0, 1, 25)[1:, None]
@@ -29,15 +29,15 @@ def _is_scalabel(_: Path, content: Any) -> bool:
     return any("name" in frame and {"labels", "objects"} & {*frame} for frame in _frames(content))
 
 
-def _read_scalabel(_path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
+def _read_scalabel(_path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
     config = content.get("config") if isinstance(content, dict) else None
-    common = drawn.size_in((config or {}).get("imageSize") or {})
+    common = shapes.size_in((config or {}).get("imageSize") or {})
     for frame in _frames(content):
-        size = drawn.size_in(frame.get("size") or {}) or common
-        yield drawn.DrawnLabel(str(frame["name"]), size, _shapes(frame, size))
+        size = shapes.size_in(frame.get("size") or {}) or common
+        yield shapes.DrawnLabel(str(frame["name"]), size, _shapes(frame, size))
 
 
-def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn.Shape]:
+def _shapes(frame: Mapping[str, Any], size: shapes.Size | None) -> Iterator[shapes.Shape]:
     for part in frame.get("labels") or frame.get("objects") or ():
         label = part["category"]
         if (runs := part.get("rle")) is not None:
@@ -49,12 +49,12 @@ def _shapes(frame: Mapping[str, Any], size: drawn.Size | None) -> Iterator[drawn
             for polygon in polygons:
                 if polygon.get("closed", not label.startswith("lane")):
                     ring = _ring(label, polygon["vertices"], polygon.get("types"))
-                    yield drawn.Outline(label, ring)
+                    yield shapes.Outline(label, ring)
         elif box := part.get("box2d"):
             corners = (box[name] for name in ("x1", "y1", "x2", "y2"))
-            yield drawn.Undrawn(label, "box without an outline", drawn.rectangle(label, *corners))
+            yield shapes.Undrawn(label, "box without an outline", shapes.rectangle(label, *corners))
         elif not {"box3d", "graph"} & part.keys():
-            yield drawn.Undrawn(label, "label without an outline")
+            yield shapes.Undrawn(label, "label without an outline")
 
 
 def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> Sequence[float]:
@@ -64,7 +64,7 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     BDD100K's toolkit; two in a row are the control points before a corner, as in Scalabel.
     """
     if types is None or "C" not in types:
-        return drawn.flatten(points)
+        return shapes.flatten(points)
     corners = np.array([*points, points[0]], np.float64)
     ring = [corners[0]]
     for part in re.finditer("L|CC[CL]?|.", types[1 : len(points)]):
@@ -79,4 +79,4 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     return np.ravel(ring).tolist()
 
 
-FORMATS: Final = (drawn.LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _read_scalabel),)
+FORMATS: Final = (shapes.LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _read_scalabel),)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 _CLASS: Final = ("class", "label", "category", "type", "name", "object")
 """Names of the attribute for the class, if regions have several attributes."""
@@ -26,7 +26,7 @@ def _regions(image: Mapping[str, Any]) -> list[Any]:
     return [*regions.values()] if isinstance(regions, dict) else regions
 
 
-def _read_via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
+def _read_via(path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
     regions = [region for image in _images(content) for region in _regions(image)]
     tables = (region.get("region_attributes") for region in regions if isinstance(region, dict))
     names = {name for table in tables if isinstance(table, dict) for name in table}
@@ -39,15 +39,15 @@ def _read_via(path: Path, content: Any, _: drawn.Size | None) -> Iterator[drawn.
         )
     attribute = next(iter([*usual, *names]), "class")
     for image in _images(content):
-        shapes = (
+        polygons = (
             _shape(region, attribute)
             for region in _regions(image)
             if region["shape_attributes"]["name"] not in ("point", "polyline")
         )
-        yield drawn.DrawnLabel(str(image["filename"]), None, shapes)
+        yield shapes.DrawnLabel(str(image["filename"]), None, polygons)
 
 
-def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
+def _shape(region: Mapping[str, Any], attribute: str) -> shapes.Shape:
     at, value = region["shape_attributes"], (region.get("region_attributes") or {}).get(attribute)
     if isinstance(value, dict):  # boxes to tick
         (value,) = (name for name, is_ticked in value.items() if is_ticked)
@@ -56,19 +56,19 @@ def _shape(region: Mapping[str, Any], attribute: str) -> drawn.Shape:
     match at["name"]:
         case "polygon":
             points = zip(at["all_points_x"], at["all_points_y"], strict=True)
-            return drawn.Outline(value, drawn.flatten(points))
+            return shapes.Outline(value, shapes.flatten(points))
         case "rect":
             left, top = at["x"], at["y"]
-            return drawn.rectangle(value, left, top, left + at["width"], top + at["height"])
+            return shapes.rectangle(value, left, top, left + at["width"], top + at["height"])
         case "circle":
-            return drawn.ellipse(value, at["cx"], at["cy"], at["r"], at["r"])
+            return shapes.ellipse(value, at["cx"], at["cy"], at["r"], at["r"])
         case "ellipse":
             x, y, degrees = at["cx"], at["cy"], math.degrees(at.get("theta", 0))
-            return drawn.ellipse(value, x, y, at["rx"], at["ry"]).rotate(degrees, (x, y))
+            return shapes.ellipse(value, x, y, at["rx"], at["ry"]).rotate(degrees, (x, y))
         case other:
-            return drawn.Undrawn(value, str(other))
+            return shapes.Undrawn(value, str(other))
 
 
 FORMATS: Final = (
-    drawn.LabelFormat("VIA", ".json", lambda _, content: any(_images(content)), _read_via),
+    shapes.LabelFormat("VIA", ".json", lambda _, content: any(_images(content)), _read_via),
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.truth import drawn
+from roadeval.logs.truth import shapes
 
 _LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]", re.MULTILINE)
 """The beginning of a line of labels, which lines with names of classes do not have."""
@@ -21,13 +21,13 @@ def _is_yolo(_: Path, content: str) -> bool:
     return not content.strip() or _LINE.search(content) is not None
 
 
-def _read_yolo(path: Path, content: str, size: drawn.Size | None) -> Iterator[drawn.DrawnLabel]:
+def _read_yolo(path: Path, content: str, size: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
     if size is None:
         raise LogError("its points are shares of the image's size, which is not known", where=path)
-    yield drawn.DrawnLabel(str(path), size, _shapes(content, size))
+    yield shapes.DrawnLabel(str(path), size, _shapes(content, size))
 
 
-def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
+def _shapes(content: str, size: shapes.Size) -> Iterator[shapes.Shape]:
     for number, line in enumerate(content.splitlines(), 1):
         if not line.strip():
             continue
@@ -43,12 +43,12 @@ def _shapes(content: str, size: drawn.Size) -> Iterator[drawn.Shape]:
             raise BadMessage(f"line {number} has points that are no shares of the image's size")
         if len(flat) == 4:
             x, y, width, height = (number / 2 for number in flat)
-            box = drawn.rectangle(
+            box = shapes.rectangle(
                 label, 2 * x - width, 2 * y - height, 2 * x + width, 2 * y + height
             )
-            yield drawn.Undrawn(label, "box without an outline", box)
+            yield shapes.Undrawn(label, "box without an outline", box)
         else:
-            yield drawn.Outline(label, flat)
+            yield shapes.Outline(label, flat)
 
 
-FORMATS: Final = (drawn.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _read_yolo),)
+FORMATS: Final = (shapes.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _read_yolo),)

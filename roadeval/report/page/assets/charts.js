@@ -243,6 +243,7 @@ function startCharts(onFrame) {
     if (!view.values.frames) continue;
     along.push(view);
     range.drive ??= view.values.x;
+    [range.low, range.high] = range.drive;
   }
   if (!along.length) return;
   const fit = () => {

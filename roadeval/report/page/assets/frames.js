@@ -1,40 +1,54 @@
-// The browser of frames: pictures of one frame, and a table of all that can be filtered.
+// The browser of frames: a film of the drive, what is known of a frame, and a table of all frames.
 
 class Browser {
   constructor(element) {
     this.element = element;
+    this.data = JSON.parse(element.dataset.drive);
     this.strips = element.querySelector(".strips");
-    this.absent = element.querySelector(".absent");
     this.rows = [...element.querySelectorAll(".frames tbody tr")];
     this.byFrame = new Map(this.rows.map((row) => [Number(row.dataset.frame), row]));
     this.held = new Map([...this.strips.children].map((strip) => [Number(strip.dataset.frame), strip]));
-    this.stage = new Stage(element.querySelector(".stage"), element.dataset.left, element.dataset.right);
+    this.place = new Map(this.data.frames.map((frame, place) => [frame, place]));
+    this.about = element.querySelector(".about");
+    this.ratesTable = document.querySelector("table[data-name=rates]");
+    this.verdict = document.querySelector(".verdict");
+    this.verdictOfDrive = this.verdict.textContent;
+    if (this.data.film) {
+      const { film, colours } = this.data;
+      this.film = new Film(element.dataset.film, film, colours, (frame) => {
+        if (this.film.playing) this.show(frame, { follow: true, address: null });
+        this.stage.draw();
+      });
+      this.stage = new Stage(element.querySelector(".stage"), this.film);
+    }
     this.tools();
     this.filters();
+    this.threshold();
     for (const row of this.rows) {
       row.addEventListener("click", (event) => {
         event.preventDefault();
         this.show(Number(row.dataset.frame));
       });
     }
-    this.strips.addEventListener("click", (event) => {
-      const tile = event.target.closest("img")?.closest(".tile");
-      if (!tile) return;
-      event.stopPropagation();
-      this.stage.choose(tile.dataset.name);
-      this.stage.toggle();
-    });
-    range.onChange.push(() => this.filter());
+    for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
+    range.onChange.push((low, high) => this.narrow(low, high));
     for (const strip of this.held.values()) strip.hidden = true;
+    startChoice(this.data.focus, () => this.chosen());
     this.follow(Boolean(location.hash));
     addEventListener("popstate", () => this.follow(true));
   }
 
-  /** Show the frame of the address, or without one the first. */
+  /** Show what the address names: a frame, the focus, a part of the drive, a threshold. */
   follow(scroll) {
-    const named = /^#frame-(\d+)$/.exec(location.hash);
-    const frame = named ? named[1] : this.element.dataset.first;
-    if (frame !== "" && (named || !location.hash || this.frame === undefined)) this.show(Number(frame), { scroll: scroll && Boolean(named), address: null });
+    const { place, frame, focus, beside, range: part, threshold } = readAddress();
+    if (place && frame === null && this.frame !== undefined) return;
+    const names = this.data.variants;
+    choose(names.includes(focus) ? focus : this.data.focus, names.includes(beside) || beside === "-" ? beside : "", () => this.chosen(false));
+    const ends = /^(\d+)-(\d+)$/.exec(part ?? "");
+    if (range.drive) zoom(...(ends ? ends.slice(1).map(Number) : range.drive));
+    if (threshold) this.setLevel(Number(threshold));
+    const worst = this.data.worst[choice.focus]?.[0] ?? Number(this.element.dataset.first);
+    this.show(frame ?? worst, { scroll: scroll && frame !== null, address: null });
   }
 
   tools() {
@@ -42,37 +56,53 @@ class Browser {
     this.where = tools.querySelector(".where");
     this.previous = tools.querySelector(".previous");
     this.next = tools.querySelector(".next");
+    this.playButton = tools.querySelector(".play");
     tools.hidden = false;
     this.previous.addEventListener("click", () => this.step(-1));
     this.next.addEventListener("click", () => this.step(1));
+    this.playButton?.addEventListener("click", () => this.toggle());
     document.addEventListener("keydown", (event) => {
       if (event.altKey || event.ctrlKey || event.metaKey) return;
-      if (event.target.closest("input, select, textarea")) return;
+      if (event.target.closest("input, select, textarea, button, summary, a")?.matches(event.key === " " ? "*" : "input, select, textarea")) return;
       const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-      if (!step) return;
+      if (step) this.step(step);
+      else if (event.key === " " && this.film) this.toggle();
+      else return;
       event.preventDefault();
-      this.step(step);
     });
   }
 
-  /** Frames with pictures, in the drive's order; of the filtered frames, if any of them has some. */
-  pictured() {
-    const all = this.rows.filter((row) => row.classList.contains("pictured"));
-    const shown = all.filter((row) => !row.hidden);
-    return (shown.length ? shown : all).map((row) => Number(row.dataset.frame)).sort((a, b) => a - b);
+  /** The frames to step through: those of the film, without one those with pictures; within the chosen part. */
+  shown() {
+    const all = this.film ? this.film.frames : [...this.held.keys()].sort((a, b) => a - b);
+    const inside = all.filter((frame) => isInRange(frame));
+    return inside.length ? inside : all;
   }
 
   step(by) {
-    const frames = this.pictured();
+    const frames = this.shown();
     const next = by > 0 ? frames.find((number) => number > this.frame) : frames.findLast((number) => number < this.frame);
     if (next !== undefined) this.show(next, { follow: true, address: "replaceState" });
+  }
+
+  /** Play from this frame, from the first one if this is the last; or stop. */
+  toggle() {
+    const [frames, button] = [this.shown(), this.playButton];
+    if (this.film.playing) this.film.pause();
+    else {
+      if (this.frame >= frames.at(-1)) this.show(frames[0]);
+      button.textContent = "Pause";
+      this.film.play(frames.at(-1), () => {
+        button.textContent = "Play";
+        this.show(this.frame, { address: "replaceState" });
+      });
+    }
   }
 
   /** Show a frame; the address names it, as a new step of the history or in place of the last step. */
   show(frame, { scroll = false, follow = false, address = "pushState" } = {}) {
     this.frame = frame;
-    if (address && location.hash !== `#frame-${frame}`) history[address](null, "", `#frame-${frame}`);
-    this.element.querySelector(".viewer").hidden = false;
+    if (address) this.writeAddress(address);
     const row = this.byFrame.get(frame);
     for (const other of this.rows) other.removeAttribute("aria-current");
     row?.setAttribute("aria-current", "true");
@@ -80,33 +110,156 @@ class Browser {
     for (const view of along) view.mark(frame);
     for (const strip of this.held.values()) strip.hidden = Number(strip.dataset.frame) !== frame;
     this.position();
-    const shown = this.held.get(frame);
-    this.stage.offer(shown ? [...shown.querySelectorAll(".tile")] : []);
-    this.absent.hidden = Boolean(shown);
-    if (!shown) this.tellAbsent(frame);
+    this.tell(row);
+    if (this.film && !this.film.playing) this.film.seek(frame);
     if (scroll) this.element.querySelector(".viewer").scrollIntoView({ block: "start" });
   }
 
+  writeAddress(step = "replaceState") {
+    const level = this.film?.levels[choice.focus];
+    const part = range.drive && range.low !== range.drive[0] ? `${Math.ceil(range.low)}-${Math.floor(range.high)}` : "";
+    const focus = choice.focus === this.data.focus ? "" : choice.focus;
+    writeAddress(this.frame, { focus, beside: choice.beside, range: part, threshold: level }, step);
+  }
+
   position() {
-    const frames = this.pictured();
+    const frames = this.shown();
     const place = frames.indexOf(this.frame);
     this.where.textContent = `Frame ${this.frame}` + (place < 0 ? "" : ` \u00b7 ${place + 1} of ${frames.length}`);
     this.previous.disabled = !frames.some((number) => number < this.frame);
     this.next.disabled = !frames.some((number) => number > this.frame);
   }
 
-  tellAbsent(frame) {
-    const [command, words] = [this.element.dataset.command.replace("{}", frame), document.createElement("code")];
-    words.textContent = command;
-    this.absent.replaceChildren("This page holds no pictures of this frame. ", this.byFrame.get(frame)?.dataset.note ?? "");
-    const near = this.pictured().sort((a, b) => Math.abs(a - frame) - Math.abs(b - frame))[0];
-    if (near !== undefined) {
-      const button = document.createElement("button");
-      button.textContent = `Frame ${near}, the nearest with pictures`;
-      button.addEventListener("click", () => this.show(near, { follow: true }));
-      this.absent.append(" ", button);
+  countsOf(variant, frame) {
+    return this.data.counts[variant]?.[this.place.get(frame)];
+  }
+
+  /** Tell the rates of this frame, its conditions, and what opens it. */
+  tell(row) {
+    const [table, names] = [this.about.querySelector("table"), Object.keys(this.data.counts)];
+    const scored = names.filter((name) => this.countsOf(name, this.frame) && isShown(name));
+    const cells = (tag, texts) => {
+      const line = document.createElement("tr");
+      line.append(...texts.map((text, place) => Object.assign(document.createElement(place ? tag : "th"), { textContent: text, scope: place ? "" : tag === "th" ? "col" : "row" })));
+      const dot = this.ratesTable?.querySelector(`tr[data-of="${CSS.escape(texts[0])}"] .dot`);
+      if (dot) line.cells[0].prepend(dot.cloneNode(true));
+      return line;
+    };
+    const rates = ["ERR", "FPR", "FNR"];
+    table.hidden = !scored.length;
+    table.tHead.replaceChildren(cells("th", ["this frame, %", ...rates]));
+    table.tBodies[0].replaceChildren(
+      ...scored.map((name) => cells("td", [name, ...rates.map((rate) => percent(RATES[rate](this.countsOf(name, this.frame))))])),
+    );
+    const sentences = this.held.get(this.frame)?.querySelectorAll(".two .note") ?? [];
+    this.about.querySelector(".words").textContent = [...sentences].map((p) => p.textContent.replace(/\.?$/, ".")).join(" ") || (row?.dataset.note ?? "");
+    const command = this.about.querySelector(".open code");
+    if (command) command.textContent = this.element.dataset.command.replace("{}", this.frame);
+  }
+
+  /** Show a change of the focus, or of the variant beside it, all over the page. */
+  chosen(isNew = true) {
+    const others = this.data.variants.filter((name) => name !== choice.focus && name !== "blind");
+    this.stage?.prefer([choice.focus, choice.beside || others[0]]);
+    this.filter();
+    this.judge();
+    this.setLevel(this.film?.levels[choice.focus]);
+    const worst = this.data.worst[choice.focus] ?? [];
+    const places = this.about.querySelector(".worst");
+    places.replaceChildren(worst.length ? `Worst frames of ${choice.focus}: ` : "", ...worst.map((frame) => this.frameButton(frame)));
+    if (isNew && worst.length) this.show(worst[0], { address: "replaceState" });
+  }
+
+  frameButton(frame) {
+    const button = document.createElement("button");
+    [button.type, button.textContent] = ["button", frame];
+    button.addEventListener("click", () => this.show(frame, { follow: true }));
+    return button;
+  }
+
+  /** Show a part of the drive: its frames, rates and verdict. */
+  narrow() {
+    this.filter();
+    this.judge();
+    if (this.frame === undefined) return;
+    const counts = (frame) => this.countsOf(choice.focus, frame);
+    const scored = this.shown().filter(counts);
+    const error = (frame) => RATES.ERR(counts(frame));
+    if (!isInRange(this.frame) && scored.length) this.show(scored.reduce((worst, frame) => (error(frame) > error(worst) ? frame : worst)), { address: null });
+    this.writeAddress();
+  }
+
+  /** Say how wrong the focus is, on the whole drive or on the chosen part of it. */
+  judge() {
+    const { words, counts, frames, verdicts } = this.data;
+    const isNarrow = range.drive && range.low !== range.drive[0];
+    const countsIn = (name) => counts[name].filter((frame, place) => frame && isInRange(frames[place]));
+    const [inside, ofFocus] = [frames.filter((frame) => isInRange(frame)), counts[choice.focus]];
+    const rates = (name) => Object.fromEntries(["ERR", "FNR", "FPR"].map((rate) => [rate, percent(meanRate(rate, countsIn(name)), 1)]));
+    this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus] ?? this.verdictOfDrive);
+    if (isNarrow && ofFocus) {
+      const others = Object.keys(counts).filter((name) => name !== choice.focus && isShown(name));
+      const told = others.map((name) => fill(words["error of a range"], { variant: name, ...rates(name) })).join(" ");
+      const named = { first: inside[0], last: inside.at(-1), frames: inside.length, variant: choice.focus, others: told };
+      this.verdict.textContent = fill(words["verdict of a range"], { ...named, ...rates(choice.focus) });
     }
-    if (command) this.absent.append(" In the viewer: ", words);
+    const link = document.querySelector("#summary .links a");
+    const scored = inside.filter((frame) => this.countsOf(choice.focus, frame));
+    if (link && scored.length) {
+      const error = (frame) => RATES.ERR(this.countsOf(choice.focus, frame));
+      const worst = scored.reduce((most, frame) => (error(frame) > error(most) ? frame : most));
+      link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(error(worst), 1) });
+      link.hash = `#frame-${worst}`;
+      link.onclick = (event) => {
+        event.preventDefault();
+        this.show(worst, { scroll: true });
+      };
+      const command = document.querySelector("#summary .links code");
+      if (command) command.textContent = this.element.dataset.command.replace("{}", worst);
+    }
+    if (this.ratesTable) narrowRates(this.ratesTable, isNarrow ? (name) => counts[name] && countsIn(name) : null);
+  }
+
+  /** A threshold on the focus' probability: the picture, the rates, and the line to write. */
+  threshold() {
+    this.thresholdBox = this.about.querySelector(".threshold");
+    if (!this.thresholdBox) return;
+    const [input, button] = [this.thresholdBox.querySelector("input"), this.thresholdBox.querySelector("button")];
+    input.addEventListener("input", () => {
+      this.setLevel(Number(input.value));
+      this.writeAddress();
+    });
+    button.addEventListener("click", () => {
+      this.setLevel(undefined);
+      this.writeAddress();
+    });
+  }
+
+  setLevel(level) {
+    const slider = this.data.thresholds[choice.focus];
+    if (!this.thresholdBox) return;
+    this.thresholdBox.hidden = !slider;
+    if (!slider) return;
+    if (this.film) {
+      if (level === undefined) delete this.film.levels[choice.focus];
+      else this.film.levels[choice.focus] = level;
+      this.stage.draw();
+    }
+    // A level holds 256 of the 65536 codes of a probability; road are the pixels above a code.
+    const code = level === undefined ? Math.round(slider.now * 65535) : 256 * level - 1;
+    const shown = Math.round((code + 1) / 256);
+    const [above, below] = [(counts) => counts.slice(shown), (counts) => counts.slice(0, shown)].map((part) => (counts) => part(counts).reduce((sum, count) => sum + count, 0));
+    const moved = [above(slider.road), below(slider.other), above(slider.other), below(slider.road)];
+    const counts = level === undefined ? slider.counts : moved;
+    const rates = Object.fromEntries(["ERR", "FPR", "FNR"].map((rate) => [rate, percent(RATES[rate](counts))]));
+    const threshold = level === undefined ? slider.now : (code / 65535).toFixed(5);
+    const [label, input, note, line] = ["label", "input", "p", "code"].map((name) => this.thresholdBox.querySelector(name));
+    const stage = slider.stage === choice.focus ? "" : ` (${slider.stage})`;
+    label.textContent = `Threshold of ${choice.focus}${stage}: ${threshold}`;
+    input.setAttribute("aria-label", label.textContent);
+    input.value = shown;
+    note.textContent = fill(this.data.words["rates of a threshold"], rates);
+    line.textContent = slider.line.replace("{}", threshold);
   }
 
   filters() {
@@ -136,8 +289,7 @@ class Browser {
     for (const row of this.rows) {
       const frame = Number(row.dataset.frame);
       const inRate = !places.length || places.some((place) => fits(numberOf(row.cells[place].textContent)));
-      const inRange = !range.drive || (frame >= range.low && frame <= range.high) || range.low === range.high;
-      row.hidden = !(inRate && inRange && hasCondition(row, limits.condition));
+      row.hidden = !(inRate && isInRange(frame) && hasCondition(row, limits.condition));
     }
     this.hideColumns();
     const shown = this.rows.filter((row) => !row.hidden).length;
@@ -154,6 +306,26 @@ class Browser {
     const shown = this.columns.filter((title) => title.dataset.variant && !title.hidden);
     const columns = new Set(shown.map((title) => title.dataset.variant)).size;
     for (const group of this.element.querySelectorAll(".frames .groups th")) group.colSpan = columns;
+  }
+}
+
+function isInRange(frame) {
+  return !range.drive || (frame >= range.low && frame <= range.high);
+}
+
+/** Put the rates of some frames into the table of the whole drive, or the drive's own again. */
+function narrowRates(table, countsOf) {
+  const titles = [...table.tHead.rows[table.tHead.rows.length - 1].cells].map((cell) => cell.textContent.replace(/[^\w ]/g, "").trim());
+  table.classList.toggle("narrow", Boolean(countsOf));
+  for (const row of table.tBodies[0].rows) {
+    const counts = countsOf?.(row.cells[0].textContent);
+    for (const [place, cell] of [...row.cells].entries()) {
+      if (!place) continue;
+      const words = cell.querySelector("b") ?? cell;
+      cell.dataset.drive ??= words.textContent;
+      const rate = counts ? rateOfColumn(titles[place], counts) : undefined;
+      words.textContent = !countsOf ? cell.dataset.drive : rate === undefined ? "\u2013" : percent(rate);
+    }
   }
 }
 

@@ -35,10 +35,11 @@ function enlargePicture(image) {
   enlarge([large, words]);
 }
 
-/** Two pictures of a frame over each other: one to the left of the slider, one to the right. */
+/** Two pictures of the film over each other: one to the left of the slider, one to the right. */
 class Stage {
-  constructor(element, left, right) {
+  constructor(element, film) {
     this.element = element;
+    this.film = film;
     this.home = element.parentElement;
     this.next = element.nextElementSibling;
     this.above = element.querySelector(".above");
@@ -46,14 +47,12 @@ class Stage {
     this.edge = element.querySelector(".edge");
     this.slider = element.querySelector("input");
     this.selects = [element.querySelector(".left"), element.querySelector(".right")];
-    this.chosen = [left, right];
     this.slider.addEventListener("input", () => this.slide());
-    for (const [side, select] of this.selects.entries()) {
-      select.addEventListener("change", () => {
-        this.chosen[side] = select.value;
-        this.draw();
-      });
+    for (const select of this.selects) {
+      select.append(...film.pictures().map((name) => new Option(name, name)));
+      select.addEventListener("change", () => this.draw());
     }
+    element.hidden = false;
     const views = element.querySelector(".views");
     let dragged = false;
     views.addEventListener("pointerdown", (event) => {
@@ -75,45 +74,20 @@ class Stage {
     });
   }
 
-  /** Offer the pictures of a frame; the choice of pictures stays, if the frame has them. */
-  offer(tiles) {
-    this.tiles = new Map(tiles.map((tile) => [tile.dataset.name, tile]));
-    for (const [side, select] of this.selects.entries()) {
-      select.replaceChildren(...[...this.tiles.keys()].map((name) => new Option(name, name)));
-      const name = this.tiles.has(this.chosen[side]) ? this.chosen[side] : [...this.tiles.keys()][0];
-      select.value = name;
-    }
-    this.element.hidden = !tiles.length;
-    if (tiles.length) this.draw();
-  }
-
-  /** Look at two variants, or at one. */
+  /** Look at two variants; at the camera in place of one that has no masks. */
   prefer(variants) {
-    const names = [...this.tiles.keys()];
+    const names = this.film.pictures();
     for (const [side, variant] of variants.entries()) {
-      const pictures = names.filter((name) => name.startsWith(`${variant}: `));
-      this.chosen[side] = pictures.find((name) => name.endsWith(": errors")) ?? pictures.at(-1) ?? this.chosen[side];
+      this.selects[side].value = names.find((name) => name.startsWith(`${variant}: `)) ?? "camera";
     }
-    this.offer([...this.tiles.values()]);
-  }
-
-  /** Look at one picture alone. */
-  choose(name) {
-    this.chosen[0] = name;
-    this.selects[0].value = name;
-    this.slide(100);
     this.draw();
   }
 
   draw() {
-    const [left, right] = this.selects.map((select) => this.tiles.get(select.value));
-    for (const [view, tile] of [[this.above, left], [this.below, right]]) {
-      const image = tile.querySelector("img");
-      [view.src, view.alt] = [image.src, image.alt];
-    }
-    for (const tile of this.tiles.values()) {
-      if (tile === left || tile === right) tile.setAttribute("aria-current", "true");
-      else tile.removeAttribute("aria-current");
+    for (const [side, view] of [this.above, this.below].entries()) {
+      const name = this.selects[side].value;
+      view.setAttribute("aria-label", name);
+      this.film.paint(view, name);
     }
     this.slide();
   }

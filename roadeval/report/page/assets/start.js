@@ -46,20 +46,16 @@ for (const long of document.querySelectorAll(".long")) makeSearchable(long);
 makeCommands();
 const element = document.querySelector(".browser");
 let browser = null;
-startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), { scroll: true }));
+startCharts((frame) => browser?.show(nearestFrame(frame)));
 startPlaces();
 if (element) browser = new Browser(element);
-startChoice(() => {
-  browser.filter();
-  browser.stage.prefer(chosen);
-});
 fitOutline();
 followOutline();
 
 /** The frame of the table that is nearest to a number. */
 function nearestFrame(frame) {
-  const frames = [...browser.byFrame.keys()].sort((a, b) => a - b);
-  return frames[nearest(frames, frame)];
+  const frames = browser.shown();
+  return frames.length ? frames[nearest(frames, frame)] : frame;
 }
 
 for (const image of document.querySelectorAll(".grid img")) {

@@ -21,9 +21,9 @@ from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.truth import formats
-from roadeval.logs.truth.drawn import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
-from roadeval.logs.truth.names import LabelSet, NamedLabel
+from roadeval.logs.truth.named_labels import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK
+from roadeval.logs.truth.shapes import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.runtime.discovery import collect
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
@@ -50,7 +50,9 @@ def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = Non
     if path.is_file() and path.suffix.lower() not in _formats():
         names = sorted({format_.name for formats in _formats().values() for format_ in formats})
         listing = ", ".join(names)
-        raise LogError(f"{path}: no file of labels; known are folders of images, and {listing}")
+        raise LogError(
+            "no file of labels", where=path, remedy=f"known are folders of images, and {listing}"
+        )
     endings = IMAGES | {NPY} | _formats().keys()
     files = [path] if path.is_file() else list_files(path, endings, below=True)
     problems: list[LogError] = []
@@ -58,7 +60,7 @@ def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = Non
         labels = _find_labels(some_files, size, settings or MaskSettings(), problems)
         if labels is not None:
             return labels
-    raise next(iter(problems), LogError(f"{path}: no label in it that roadeval can read"))
+    raise next(iter(problems), LogError("no label in it that roadeval can read", where=path))
 
 
 def _find_labels(
@@ -82,7 +84,7 @@ def _find_labels(
                     if format_.holds(file, content):
                         return _read_drawn(of_ending, {file: content}, format_, size, settings)
             names = " or ".join(format_.name for format_ in format_list)
-            problems.append(LogError(f"{file}: not labels of {names}"))
+            problems.append(LogError(f"not labels of {names}", where=file))
     return LabelSet(tuple(map(file_label, labels))) if labels else None
 
 

@@ -14,9 +14,9 @@ import pytest
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LabelPlace, LabelSettings, LogConfig, TopicSettings
-from roadeval.logs.truth.beside import GREATEST, labels_in
 from roadeval.logs.truth.formats.coco import lengths_in
-from roadeval.logs.truth.labels import label_files
+from roadeval.logs.truth.label_files import GREATEST, labels_in
+from roadeval.logs.truth.meaning import label_files
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.sentence import Setting
 from tests.e2e.commands import here

@@ -35,7 +35,7 @@ from roadeval.logs.messages.pixels import (
 from roadeval.logs.settings import Color, LabelPlace, LabelSettings, MaskSettings
 from roadeval.logs.topics.choose import lossy_labels
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.truth.names import LabelSet, NamedLabels
+from roadeval.logs.truth.named_labels import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
     Camera,
@@ -224,7 +224,7 @@ def _is_blurred(colours: Rgb) -> bool:
     return bool(is_grey and is_white.any() and np.mean((levels > most) & ~is_white) <= RARE)
 
 
-def understand(
+def find_meaning(
     labels: LabelSettings, pictures: Sequence[Collection[int]], name: str, shown: str = "road"
 ) -> ClassMap:
     """Find the meaning of the values of label pictures, which show road or ``shown``.
@@ -259,7 +259,7 @@ def understand(
     raise UnclearLabelsError(problem, remedy=remedy)
 
 
-def understand_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
+def find_class_meaning(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     """Find the meaning of drawn labels by the names of their classes.
 
     If the only class is called road, it means road. A `LogError` if the settings name no class of
@@ -531,9 +531,9 @@ def meaning_of(
         return confidence
     origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
     if origin.occurring:
-        meaning = understand_classes(settings.labels, origin, labels.name)
+        meaning = find_class_meaning(settings.labels, origin, labels.name)
     else:
-        meaning = understand(settings.labels, counts, labels.name, shown)
+        meaning = find_meaning(settings.labels, counts, labels.name, shown)
     pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()
     for value, count in pixels.items():

@@ -122,7 +122,7 @@ class NamedLabels:
             try:
                 content = label.content()
             except OSError as error:
-                raise LogError(f"{label.path}: {error.strerror}") from error
+                raise LogError(str(error.strerror), where=label.path) from error
             digest.update(f"{key} {hashlib.sha256(content).hexdigest()}\n".encode())
         return digest.hexdigest()
 
@@ -161,7 +161,7 @@ def find_keys(
         if keys[one] == keys[other]:
             first, second = (one, other) if one.name == other.name else (one.name, other.name)
             both = f"{visible(str(first))} and {visible(str(second))}"
-            raise LogError(f"{name}: {both} belong to the same frame, by {by}")
+            raise LogError(f"{both} belong to the same frame, by {by}", where=name)
     rising = np.array([keys[label.path] for label in labels], np.int64)
     number = settings.first or 0
     if by == "number":
@@ -199,7 +199,7 @@ def _keys_of(
         return "number", _numbers_of(files, settings.names)
     for file in files:
         if file not in times:
-            raise LogError(f"{file}: its name is not a time, so its frame cannot be found")
+            raise LogError("its name is not a time, so its frame cannot be found", where=file)
     return "stamp", times
 
 

@@ -253,8 +253,8 @@ def runs_of(label: str, pixels: Mask, left: int = 0, top: int = 0) -> Runs:
 class LabelFormat:
     """A format of files with labels.
 
-    `roadeval.logs.truth.beside` parses a file by its ending: ``.json`` to lists and dicts, ``.xml``
-    to its root element, ``.txt`` to a text.
+    `roadeval.logs.truth.label_files` parses a file by its ending: ``.json`` to lists and dicts,
+    ``.xml`` to its root element, ``.txt`` to a text.
     """
 
     name: str

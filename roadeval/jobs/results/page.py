@@ -1,0 +1,187 @@
+"""What a page shows of a drive: its video, its frames with pictures, and what can be chosen."""
+
+from __future__ import annotations
+
+import json
+from bisect import bisect_right
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from roadeval.data import (
+    OUTCOMES,
+)
+from roadeval.evaluation import tables
+from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score.thresholds import LEVELS
+from roadeval.evaluation.score.unlabelled import SIGNS
+from roadeval.evaluation.tables import finals, only, values_of
+from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.jobs.results.frames import FramePicker, evenly, facts_of
+from roadeval.jobs.results.result import DriveResult
+from roadeval.report.blocks import Strip
+from roadeval.report.charts.standard import over_frames, ribbons
+from roadeval.report.film import (
+    CAMERA,
+    MASK,
+    PROBABILITY,
+    TRUTH_PANEL,
+    Film,
+    make_film,
+    shade_truth,
+)
+from roadeval.report.sections.frames import FrameBrowser, ThresholdSlider
+from roadeval.results.verdict import verdicts
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+PICTURED: Final = 8
+"""Frames of a page with pictures of all layers, at most."""
+BYTES: Final = 9_900_000
+"""Size of a page, at most."""
+FILMED: Final = 500
+"""Frames of a page's video, at most: a longer drive is thinned."""
+FILM_BYTES: Final = 30_000
+"""Bytes of a page's video, at most, for each frame; a third more as text of the page."""
+
+
+def browsed(result: DriveResult) -> FrameBrowser:
+    """Collect the frames of a result for a page, without their pictures."""
+    frames, names = result.rows, [*SHORT]
+    if not len(frames):
+        frames = result.table("unlabelled")
+        names = [sign for sign in SIGNS if frames[sign].notna().any()]
+    charts = over_frames(frames, names)
+    masks = finals(result.rows)
+    variants = values_of(frames, "variant")
+    return FrameBrowser(
+        rows=[*facts_of(result)],
+        variants=variants,
+        titles=names,
+        charts=charts,
+        command=result.inspect("{}") if result.recording else "",
+        ribbons=ribbons(charts[:1]),
+        counts={
+            name: dict(
+                zip(rows["frame"].tolist(), rows[[*OUTCOMES]].to_numpy().tolist(), strict=True)
+            )
+            for name in variants
+            if len(rows := only(masks, variant=name))
+        },
+        verdicts=verdicts(result.facts, result.table("unlabelled")),
+        focus=result.focus or "",
+        worst={
+            name: tables.worst(only(masks, variant=name), PICTURED)["frame"].tolist()
+            for name in variants
+        },
+        thresholds=[*_thresholds_of(result)],
+    )
+
+
+def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
+    """Yield the thresholds that can be moved: of stages that tell how probable road is."""
+    facts, levels = result.facts, result.table("probabilities")
+    for variant, stages in facts.curves.items():
+        for stage in stages:
+            rows = only(levels, variant=variant, stage=stage)
+            best, settings = facts.thresholds.get(variant, {}), facts.settings.get(variant, {})
+            now = settings.get(stage, {}).get("threshold", best.get("own"))
+            if now is None or not len(rows):
+                continue
+            by_level = np.zeros((2, LEVELS), np.int64)
+            by_level[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
+            counts = [facts.totals[variant][stage][name] for name in OUTCOMES]
+            line = "threshold = {}"
+            if stage == "net":
+                network = json.dumps(settings["net"]["file"])
+                line = f"# for --net {variant}={variant}.toml\nfile = {network}\n{line}"
+            elif stage in settings:
+                line = f"# in the settings of {variant}\n[{stage}]\n{line}"
+            yield ThresholdSlider(variant, stage, now, line, counts, by_level)
+
+
+def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> Film | None:
+    """Return the video of a drive, of at most ``room`` bytes; None without pictures.
+
+    A long drive is thinned evenly; frames with pictures of all layers are kept.
+    """
+    recording = result.recording
+    if recording is None or not result.pictured:
+        return None
+    scored = {*result.rows["frame"]}
+    there = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
+    chosen = sorted({*evenly(there, FILMED), *_choose_frames(result, PICTURED)})
+    names = [variant.name for variant in recording.variants]
+    finals_of = {variant.name: variant.stages[-1] for variant in recording.variants}
+    probable = [name for name in result.facts.curves if name in names]
+    panels = [
+        *(CAMERA, *[TRUTH_PANEL] * bool(scored)),
+        *map(MASK.format, names),
+        *map(PROBABILITY.format, probable),
+    ]
+
+    def read(frame: int) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
+        on_progress(Progress(bisect_right(chosen, frame), len(chosen), "filming"))
+        yield CAMERA, recording.image(frame)
+        if frame in scored:
+            yield TRUTH_PANEL, shade_truth(recording.truth(frame))
+        for name, stage in finals_of.items():
+            if (mask := result.layer(name, stage, frame)) is not None:
+                yield MASK.format(name), mask * np.uint8(255)
+        for name in probable:
+            if (probability := result.layer(name, "probability", frame)) is not None:
+                yield PROBABILITY.format(name), (probability * 255).astype(np.uint8)
+
+    while True:
+        film = make_film(chosen, panels, lambda frame: dict(read(frame)), room)
+        if len(film.content) <= room or len(chosen) < 2:
+            return film
+        chosen = chosen[::2]
+
+
+def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
+    """Return frames with their pictures, in the drive's order: the worst, the best, and others.
+
+    At most `PICTURED`, and as many as have room in so many bytes of a page.
+    """
+    if result.recording is None:
+        return []
+    chosen = _choose_frames(result, PICTURED)
+    picker, strips = FramePicker(result, None, None), []
+    for done, frame in enumerate(chosen, 1):
+        made = picker.strip(frame)
+        # On a page pictures are text, with words around each.
+        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+        if room < 0:
+            break
+        strips.append(made)
+        on_progress(Progress(done, len(chosen), "reading"))
+    return sorted(strips, key=lambda strip: strip.frame)
+
+
+def _choose_frames(result: DriveResult, count: int) -> list[int]:
+    """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
+    rows = result.rows
+    scored_frames = {*rows["frame"]}
+    there = [number for number in result.pictured if number in scored_frames]
+    pictured = there or [*result.pictured]
+    focus = result.facts.focus
+    count = min(count, len(pictured))
+    spread = evenly(pictured, count)
+    if focus is None:
+        unlabelled = result.facts.unlabelled
+        doubtful = [
+            frame for frame in (unlabelled.look_at if unlabelled else ()) if frame in pictured
+        ]
+        return list(dict.fromkeys([*doubtful, *spread]))[:count]
+    masks = finals(only(rows, variant=focus))
+    masks = masks[masks["frame"].isin(pictured)]
+    worst = tables.worst(masks, count)["frame"].tolist()
+    best = tables.worst(masks, len(masks), apart_ns=0)["frame"].tolist()[::-1]
+    turns: list[int] = []
+    for place in range(count):
+        turns += worst[2 * place : 2 * place + 2]
+        turns += [*best[place : place + 1], *spread[place : place + 1]]
+    return list(dict.fromkeys([*turns, *pictured]))[:count]
