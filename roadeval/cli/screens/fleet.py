@@ -18,7 +18,6 @@ from roadeval.report.sections.drives import by_reason, drives_table
 from roadeval.report.sections.summary import drives_account
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -47,7 +46,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show(
-            [*blocks, Heading(f"Drives with the highest ERR of {focus_of(facts.finals)}"), worst],
+            [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],
             out,
         )
         out.print()
