@@ -6,6 +6,7 @@ annotation that cannot be resolved, a module that cannot be imported.
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from collections.abc import Callable
@@ -28,6 +29,8 @@ UNRESOLVED: Final = (
 """Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of
 constructors, inherited or of named tuples, which do not know the module that they were written
 in."""
+SETTING: Final = re.compile(r"^([a-z_]+): ", re.MULTILINE)
+"""The name of a setting in the docstring of its class."""
 
 
 def prepare(package: ModuleType) -> None:
@@ -47,8 +50,8 @@ def prepare(package: ModuleType) -> None:
 
 
 def in_markdown(convert: Callable[[str], str]) -> Callable[[str], str]:
-    """Return a converter that takes the ``::`` before a literal block, too, which pdoc prints."""
-    return lambda text: convert(text.replace("::\n", ":\n"))
+    """Return a converter that makes a list of settings, and drops the ``::`` before a block."""
+    return lambda text: convert(SETTING.sub(r"- **\1**: ", text.replace("::\n", ":\n")))
 
 
 def main(folder: str = "build/api") -> None:

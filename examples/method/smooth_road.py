@@ -15,7 +15,11 @@ SMOOTH = mask_spec("smooth", "As smooth as the ground ahead")
 
 @dataclass(frozen=True)
 class SmoothSettings:
-    """Settings of road by smoothness: the ``window`` of texture in pixels, and a ``factor``."""
+    """Settings of road by smoothness.
+
+    window: Side of the square in which texture is measured, in pixels.
+    factor: Texture of road at most, as a multiple of the patch's median.
+    """
 
     window: int = 7
     factor: float = 2.0

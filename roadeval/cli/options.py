@@ -32,42 +32,45 @@ OptionValues = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class MethodSettings:
-    """Options that stand for more than one setting; `roadeval.cli.arguments` reads them."""
+    """Options that stand for more than one setting; `roadeval.cli.arguments` reads them.
+
+    preset: Preset to start from; paper: equations as meant (the default); printed: their misprints
+        taken literally; printed_order: the paper's post-processing order; hsi: shadow compensated
+        in HSI; gated: a more careful shadow filter; robust: best on real roads.
+    config: File of settings on top of the preset: an edited output of 'roadeval config', the
+        run.toml of an earlier run, or the recording of that run.
+    variants: Further variant: a preset, as robust, or a file of settings.
+    nets: Network as a further variant: an ONNX file, or a TOML file that names one.
+    masks: Masks as a further variant: a folder, LOG.mcap:/topic, or a TOML file.
+    tunes: Method, as a network, that is corrected in a further variant NAME_tuned, which learns
+        from this drive's first labelled frames. Its trees use the method's output and all features
+        of the preset robust, and learn where the method errs.
+    only: Variant to run, masks included; the others are left out. If none of them learns anything,
+        no frame is used for training.
+    cameras: Topic of the camera, if the log has several. If it is given again, each camera is
+        replayed, scored by itself, and recorded beside the others.
+    ground: File of the camera's height, angles and lens, if the log lacks them: with these, errors
+        are counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration or of
+        Kalibr.
+    """
 
     preset: Annotated[
         str | None, Flag("--preset", "paper|printed|printed_order|hsi|gated|robust")
     ] = None
-    """Preset to start from; paper: equations as meant (the default); printed: their misprints taken
-    literally; printed_order: the paper's post-processing order; hsi: shadow compensated in HSI;
-    gated: a more careful shadow filter; robust: best on real roads."""
     config: Annotated[Path | None, Flag("--config", "FILE.toml")] = None
-    """File of settings on top of the preset: an edited output of 'roadeval config', the run.toml of
-    an earlier run, or the recording of that run."""
     variants: Annotated[Mapping[str, str | None], Flag("--variant", "NAME=FILE|PRESET")] = (
         dataclasses.field(default_factory=dict)
     )
-    """Further variant: a preset, as robust, or a file of settings."""
     nets: Annotated[Mapping[str, str], Flag("--net", "NAME=FILE")] = dataclasses.field(
         default_factory=dict
     )
-    """Network as a further variant: an ONNX file, or a TOML file that names one."""
     masks: Annotated[Mapping[str, str], Flag("--masks", "NAME=PATH")] = dataclasses.field(
         default_factory=dict
     )
-    """Masks as a further variant: a folder, LOG.mcap:/topic, or a TOML file."""
     tunes: Annotated[tuple[str, ...], Flag("--tune", "NAME")] = ()
-    """Method, as a network, that is corrected in a further variant NAME_tuned, which learns from
-    this drive's first labelled frames. Its trees use the method's output and all features of the
-    preset robust, and learn where the method errs."""
     only: Annotated[tuple[str, ...], Flag("--only", "NAME")] = ()
-    """Variant to run, masks included; the others are left out. If none of them learns anything, no
-    frame is used for training."""
     cameras: Annotated[tuple[str, ...], Flag("--image-topic", "T", "Input")] = ()
-    """Topic of the camera, if the log has several. If it is given again, each camera is replayed,
-    scored by itself, and recorded beside the others."""
     ground: Annotated[Path | None, Flag("--camera", "FILE", "Input")] = None
-    """File of the camera's height, angles and lens, if the log lacks them: with these, errors are
-    counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration or of Kalibr."""
 
 
 MOST_USED: Final = "Most used"

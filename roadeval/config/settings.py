@@ -19,45 +19,51 @@ SECTIONS: Final = (
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """Where the results of a run are written, and which images are recorded."""
+    """Where the results of a run are written, and which images are recorded.
+
+    save: File of the recording. Default: ``recordings/<drive>.rrd``.
+    reports: Folder of tables and figures. Default: ``reports/<recording>/``.
+    mcap: Log of masks, error maps and rates, to open beside the drive. Default: none.
+    record: Pictures to record: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``. ``masks``
+        also records labels and the camera's image. ``worst:K`` records all pictures of the K frames
+        with the highest ERR, in a log without truth with the most uncertain masks; ``every:N``
+        those of every N-th frame. ``none`` makes no recording.
+    focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the
+        first that you bring, else ``filtered``.
+    figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
+    """
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
-    """File of the recording. Default: ``recordings/<drive>.rrd``."""
     reports: Annotated[str | None, Flag("-o --output --reports", "DIR")] = None
-    """Folder of tables and figures. Default: ``reports/<recording>/``."""
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
-    """Log of masks, error maps and rates, to open beside the drive. Default: none."""
     record: Annotated[str, Flag("--record", "WHAT")] = "all"
-    """Pictures to record: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``. ``masks`` also
-    records labels and the camera's image. ``worst:K`` records all pictures of the K frames with
-    the highest ERR, in a log without truth with the most uncertain masks; ``every:N`` those of
-    every N-th frame. ``none`` makes no recording."""
     focus: Annotated[str | None, Flag("--focus", "NAME", "Methods")] = None
-    """Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
-    that you bring, else ``filtered``."""
     figures: bool = True
-    """Whether the paper's figures are drawn; a fleet does not draw those of its drives."""
 
 
 @dataclass(frozen=True)
 class ExecutionSettings:
-    """How a run is executed, which changes no result."""
+    """How a run is executed, which changes no result.
+
+    jobs: Worker threads, or processes of a fleet. Default: one per CPU core.
+    patience_s: Seconds that a server with a log may be silent before the run ends.
+    """
 
     jobs: Annotated[int | None, Interval(ge=1, le=1000), Flag("--jobs", "N")] = None
-    """Worker threads, or processes of a fleet. Default: one per CPU core."""
     patience_s: Annotated[float, Interval(ge=1, le=3600), Flag("--patience", "SECONDS")] = 20.0
-    """Seconds that a server with a log may be silent before the run ends."""
 
 
 @dataclass(frozen=True)
 class FleetSettings:
-    """How a fleet of drives is replayed; a single drive ignores it."""
+    """How a fleet of drives is replayed; a single drive ignores it.
+
+    folds: Number of folds into which drives, or their groups, are divided. Each fold is scored by a
+        model that learnt from the other folds. Copies of one log are in one group. Without folds
+        ``training.model`` scores all drives, or each drive trains its own model.
+    keep: Recordings to keep: of ``all`` drives, or ``none``.
+    scheduler: Dask scheduler whose workers replay the drives: ``tcp://host:8786``, or its file.
+    """
 
     folds: Annotated[int | None, Interval(ge=2, le=1000), Flag("--folds", "K")] = None
-    """Number of folds into which drives, or their groups, are divided. Each fold is scored by a
-    model that learnt from the other folds. Copies of one log are in one group. Without folds
-    ``training.model`` scores all drives, or each drive trains its own model."""
     keep: Annotated[Literal["all", "none"], Flag("--keep", "WHAT")] = "none"
-    """Recordings to keep: of ``all`` drives, or ``none``."""
     scheduler: Annotated[str | None, Flag("--scheduler", "ADDRESS")] = None
-    """Dask scheduler whose workers replay the drives: ``tcp://host:8786``, or its file."""

@@ -28,19 +28,27 @@ Metres = Annotated[int, Field(ge=0, le=500)]
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class EvaluationSettings:
-    """How results are counted, summed up and judged. Rates are fractions."""
+    """How results are counted, summed up and judged. Rates are fractions.
+
+    window: Evaluated frames in a row of ``windows.csv``; the paper's is 10 (section 5).
+    boundary_width: Pixels on either side of the truth's edge that make up the region ``boundary``.
+        Annotators place an edge with a few pixels of freedom, so errors there mean less.
+    bands: Equal stripes of image rows, ``band_0`` at the top: how far away an error lies.
+    confidence: Confidence of the interval around a difference.
+    least_frames: Frames that an interval needs. Fewer tell almost nothing about how alike
+        neighbours are.
+    distances: Metres ahead between which errors are counted apart, for a known camera.
+    edges_at: Metres ahead at which the road's left and right edges are measured.
+    plan: Metres ahead of the ground that is seen from above, as in KITTI's road benchmark.
+    plan_width: Its width in metres; edges farther to the side than half of it are not searched.
+    plan_cell: Side of its cells in metres; each cell counts once.
+    """
 
     window: Annotated[int, Field(ge=1, le=1_000_000_000)] = 10
-    """Evaluated frames in a row of ``windows.csv``; the paper's is 10 (section 5)."""
     boundary_width: Annotated[int, Field(ge=1, le=100)] = 5
-    """Pixels on either side of the truth's edge that make up the region ``boundary``. Annotators
-    place an edge with a few pixels of freedom, so errors there mean less."""
     bands: Annotated[int, Field(ge=1, le=50)] = 5
-    """Equal stripes of image rows, ``band_0`` at the top: how far away an error lies."""
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
-    """Confidence of the interval around a difference."""
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
-    """Frames that an interval needs. Fewer tell almost nothing about how alike neighbours are."""
     distances: Annotated[tuple[Metres, ...], Field(min_length=2, max_length=20)] = (
         0,
         10,
@@ -48,15 +56,10 @@ class EvaluationSettings:
         40,
         80,
     )
-    """Metres ahead between which errors are counted apart, for a known camera."""
     edges_at: Annotated[tuple[Metres, ...], Field(max_length=20)] = (5, 10, 20, 40)
-    """Metres ahead at which the road's left and right edges are measured."""
     plan: tuple[Metres, Metres] = (6, 46)
-    """Metres ahead of the ground that is seen from above, as in KITTI's road benchmark."""
     plan_width: Annotated[float, Field(gt=0, le=200)] = 20.0
-    """Its width in metres; edges farther to the side than half of it are not searched."""
     plan_cell: Annotated[float, Field(ge=0.01, le=1)] = 0.05
-    """Side of its cells in metres; each cell counts once."""
 
     def __post_init__(self) -> None:
         for name in ("distances", "plan"):

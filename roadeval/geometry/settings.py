@@ -21,30 +21,32 @@ class GroundSettings:
     Each setting replaces a fact of the log: intrinsics of a CameraInfo or CameraCalibration, height
     and angles of its static transforms. If intrinsics, height and pitch are known, errors are
     counted in metres, too.
+
+    height: Metres from the ground to the camera.
+    pitch: Degrees by which it looks down; negative if it looks up.
+    roll: Degrees by which it leans to the right. Default: that of the log's transforms, else 0.
+    fov: Degrees from the left edge of the image to the right one, for a lens without distortion.
+    focal: Focal length in pixels, or two: across and down.
+    centre: Column and row of the principal point. Default: the middle of the image.
+    size: Width and height of the images for focal length, centre and homography. Default: the log's
+        images.
+    model: Distortion model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant`` (a fisheye).
+    distortion: Coefficients of the distortion, in the order of ROS and OpenCV.
+    homography: Nine numbers, row by row: from column, row and 1 (in an image without distortion) to
+        metres ahead, metres to the left, and 1, times any factor. It replaces height, pitch and
+        roll.
     """
 
     height: Annotated[float | None, Interval(ge=0.01, le=1000)] = None
-    """Metres from the ground to the camera."""
     pitch: Degrees | None = None
-    """Degrees by which it looks down; negative if it looks up."""
     roll: Annotated[float, Interval(ge=-180, le=180)] | None = None
-    """Degrees by which it leans to the right. Default: that of the log's transforms, else 0."""
     fov: Annotated[float | None, Interval(ge=0.5, le=175)] = None
-    """Degrees from the left edge of the image to the right one, for a lens without distortion."""
     focal: Annotated[tuple[Length, ...], Len(max_length=2)] = ()
-    """Focal length in pixels, or two: across and down."""
     centre: Annotated[tuple[Number, ...], Len(max_length=2)] = ()
-    """Column and row of the principal point. Default: the middle of the image."""
     size: Annotated[tuple[Pixels, ...], Len(max_length=2)] = ()
-    """Width and height of the images for focal length, centre and homography. Default: the log's
-    images."""
     model: str = ""
-    """Distortion model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant`` (a fisheye)."""
     distortion: Annotated[tuple[Number, ...], Len(max_length=14)] = ()
-    """Coefficients of the distortion, in the order of ROS and OpenCV."""
     homography: Annotated[tuple[Entry, ...], Len(max_length=9)] = ()
-    """Nine numbers, row by row: from column, row and 1 (in an image without distortion) to metres
-    ahead, metres to the left, and 1, times any factor. It replaces height, pitch and roll."""
 
     def __post_init__(self) -> None:
         if self.fov is not None and self.focal:

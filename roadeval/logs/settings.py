@@ -79,31 +79,34 @@ Color = tuple[Level, Level, Level]
 
 @dataclass(frozen=True)
 class TopicSettings:
-    """Topics, if the log leaves a choice, and how label images are paired with images."""
+    """Topics, if the log leaves a choice, and how label images are paired with images.
+
+    image: The camera's topic, if the log has several.
+    frame_id: The ``frame_id`` in the headers of the images to read, if cameras share a topic.
+    truth: The topic of label images that show where road is; an empty name means none.
+    shadow: The topic of masks that show where shadow truly is; an empty name means none.
+    masks: The topic of road masks, such as a network's output, that are scored as one more variant.
+    sync_tolerance_ms: Greatest difference in milliseconds between the stamps of an image and its
+        truth. Default: half the frame period.
+    sync_offset_ms: Milliseconds to add to the stamps of the truth before it is paired; below 0 if
+        it is late.
+    resize_truth: Scaling of label images of another size to the image's (nearest pixel).
+    """
 
     image: str | None = None
-    """The camera's topic, if the log has several."""
     frame_id: Annotated[str | None, Flag("--frame-id", "ID")] = None
-    """The ``frame_id`` in the headers of the images to read, if cameras share a topic."""
     truth: Annotated[str | None, Flag("--truth-topic", "T")] = None
-    """The topic of label images that show where road is; an empty name means none."""
     shadow: Annotated[str | None, Flag("--shadow-topic", "T")] = None
-    """The topic of masks that show where shadow truly is; an empty name means none."""
     masks: Annotated[Mapping[str, str], Flag("--mask-topic", "NAME=TOPIC", "Methods")] = field(
         default_factory=dict
     )
-    """The topic of road masks, such as a network's output, that are scored as one more variant."""
     sync_tolerance_ms: Annotated[
         float | None, Interval(ge=0, le=86_400_000), Flag("--sync-tolerance", "MS")
     ] = None
-    """Greatest difference in milliseconds between the stamps of an image and its truth. Default:
-    half the frame period."""
     sync_offset_ms: Annotated[
         float, Interval(ge=-86_400_000, le=86_400_000), Flag("--sync-offset", "MS")
     ] = 0.0
-    """Milliseconds to add to the stamps of the truth before it is paired; below 0 if it is late."""
     resize_truth: Annotated[bool, Flag("--resize-truth")] = False
-    """Scaling of label images of another size to the image's (nearest pixel)."""
 
 
 @dataclass(frozen=True)
@@ -130,16 +133,17 @@ class LabelSettings:
 
     All others are non-road. By default a mask has 0, 255 for road and 128 for ignore; or 0, 1 for
     road and 255 for ignore. Negative values mean no label: they are ignored, unless they are named.
+
+    road: Truth values (of a palette: its indices), or names of classes, that mean road.
+    ignore: Truth values, or names of classes, that are not counted.
+    road_colors: Truth colours that mean road, as red, green and blue.
+    ignore_colors: Truth colours that are not counted.
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
-    """Truth values (of a palette: its indices), or names of classes, that mean road."""
     ignore: Annotated[tuple[Value | Name, ...], Flag("--ignore-label", "V|NAME")] = ()
-    """Truth values, or names of classes, that are not counted."""
     road_colors: Annotated[tuple[Color, ...], Flag("--road-color", "R,G,B")] = ()
-    """Truth colours that mean road, as red, green and blue."""
     ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
-    """Truth colours that are not counted."""
 
     def __post_init__(self) -> None:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
@@ -162,30 +166,32 @@ class LabelSettings:
 
 @dataclass(frozen=True)
 class LabelPlace:
-    """Road truth that lies beside the log, and how it is paired with the log's frames."""
+    """Road truth that lies beside the log, and how it is paired with the log's frames.
+
+    path: Folder of labels, one a frame (images, NPY); COCO, CVAT, LabelMe, YOLO, Label Studio,
+        Cityscapes, BDD100K, VIA; or LOG.mcap:/topic. In the path ``{drive}`` is the name of the
+        drive's file without its ending.
+    pair: The pairing of labels with frames: by ``number``, by which the labels' names differ, or by
+        ``stamp``, if each name is a time (seconds, or milli-, micro- or nanoseconds since 1970).
+        Default: stamps for a log, and for files if all names are times of more than ten digits.
+    first: The number of the first frame's label. Default: the only one that the numbers allow.
+    names: A pattern of the names of labels to read, such as ``left/*`` for one of several cameras.
+        In ``*_{number}_v?.png`` the part ``{number}`` is the frame's number; ``*`` and ``?`` are
+        any text and any letter.
+    images: The folder of the images in the log, in their order: a label belongs to the image of the
+        same name, without endings such as ``_mask``. It may contain ``{drive}``.
+    skip_roadless: Only drawn labels that contain road. Otherwise an image with shapes of other
+        classes alone counts as one without road.
+    """
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
-    """Folder of labels, one a frame (images, NPY); COCO, CVAT, LabelMe, YOLO, Label Studio,
-    Cityscapes, BDD100K, VIA; or LOG.mcap:/topic. In the path
-    ``{drive}`` is the name of the drive's file without its ending."""
     pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
-    """The pairing of labels with frames: by ``number``, by which the labels' names differ, or by
-    ``stamp``, if each name is a time (seconds, or milli-, micro- or nanoseconds since 1970).
-    Default: stamps for a log, and for files if all names are times of more than ten digits."""
     first: Annotated[int | None, Interval(ge=0, le=1_000_000_000), Flag("--truth-first", "N")] = (
         None
     )
-    """The number of the first frame's label. Default: the only one that the numbers allow."""
     names: Annotated[str, Flag("--truth-names", "PATTERN")] = "*"
-    """A pattern of the names of labels to read, such as ``left/*`` for one of several cameras. In
-    ``*_{number}_v?.png`` the part ``{number}`` is the frame's number; ``*`` and ``?`` are any
-    text and any letter."""
     images: Annotated[str | None, Flag("--truth-images", "FOLDER")] = None
-    """The folder of the images in the log, in their order: a label belongs to the image of the same
-    name, without endings such as ``_mask``. It may contain ``{drive}``."""
     skip_roadless: Annotated[bool, Flag("--skip-roadless")] = False
-    """Only drawn labels that contain road. Otherwise an image with shapes of other classes alone
-    counts as one without road."""
 
     def __post_init__(self) -> None:
         if self.images is not None and (self.pair, self.first) != (None, None):
@@ -194,16 +200,18 @@ class LabelPlace:
 
 @dataclass(frozen=True)
 class MaskSettings(LabelPlace):
-    """Another method's road masks that lie beside the log."""
+    """Another method's road masks that lie beside the log.
+
+    threshold: For confidence maps: the least confidence of road, from 0 to 1. Whole numbers of 8 or
+        16 bits are divided by the greatest one.
+    decide: For confidence maps: ``threshold``, or ``trained`` for the one with the fewest errors on
+        the training frames.
+    labels: For masks of other values than 0 and 255 (road), or 0 and 1 (road): their meaning.
+    """
 
     threshold: Annotated[float | None, Interval(gt=0, le=1)] = None
-    """For confidence maps: the least confidence of road, from 0 to 1. Whole numbers of 8 or 16 bits
-    are divided by the greatest one."""
     decide: Literal["threshold", "trained"] = "threshold"
-    """For confidence maps: ``threshold``, or ``trained`` for the one with the fewest errors on the
-    training frames."""
     labels: LabelSettings = LabelSettings()
-    """For masks of other values than 0 and 255 (road), or 0 and 1 (road): their meaning."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -215,36 +223,38 @@ class MaskSettings(LabelPlace):
 
 @dataclass(frozen=True)
 class FrameSettings:
-    """The frames of the log that are read, and how they are decoded."""
+    """The frames of the log that are read, and how they are decoded.
+
+    start: First time: seconds from the log's start, nanoseconds, or RFC 3339.
+    end: End time, exclusive.
+    every: Step from frame to frame: 5 reads every fifth one.
+    labelled: Only frames that have truth. Windows and flicker are of consecutive ones of these,
+        however far apart they are.
+    max_frames: Greatest number of frames to read.
+    scale: Share of their width and height to which frames and truth are reduced. A smaller one is
+        quicker and coarser, and gives other results.
+    max_pixels: Greatest number of pixels of an image. Larger images are not decoded: a damaged head
+        may claim any size.
+    unturned: Images as they are stored, without the turn of their EXIF orientation or a video's
+        display matrix. Viewers and annotation tools turn them; calibrations are for the sensor.
+    full_range: A luma of 0 to 255 in videos, as in converted JPEGs, whatever they state. Default:
+        the range that a video states, else 16 to 235.
+    white: The sample that is white in images of more than 8 bits. Default: the greatest number of
+        8, 10, 12, 14 or 16 bits, as many as the samples of some images need; 1 for fractions.
+    """
 
     start: Annotated[Time | None, Flag("-S --start", "TIME")] = None
-    """First time: seconds from the log's start, nanoseconds, or RFC 3339."""
     end: Annotated[Time | None, Flag("-E --end", "TIME")] = None
-    """End time, exclusive."""
     every: Annotated[int, Count, Flag("--every", "N")] = 1
-    """Step from frame to frame: 5 reads every fifth one."""
     labelled: Annotated[bool, Flag("--labelled")] = False
-    """Only frames that have truth. Windows and flicker are of consecutive ones of these, however
-    far apart they are."""
     max_frames: Annotated[int | None, Count, Flag("--max-frames", "N")] = None
-    """Greatest number of frames to read."""
     scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0
-    """Share of their width and height to which frames and truth are reduced. A smaller one is
-    quicker and coarser, and gives other results."""
     max_pixels: Annotated[int, Interval(ge=1, le=1 << 30), Flag("--max-pixels", "N", "Input")] = (
         MAX_PIXELS
     )
-    """Greatest number of pixels of an image. Larger images are not decoded: a damaged head may
-    claim any size."""
     unturned: Annotated[bool, Flag("--unturned", group="Input")] = False
-    """Images as they are stored, without the turn of their EXIF orientation or a video's display
-    matrix. Viewers and annotation tools turn them; calibrations are for the sensor."""
     full_range: Annotated[bool, Flag("--full-range", group="Input")] = False
-    """A luma of 0 to 255 in videos, as in converted JPEGs, whatever they state. Default: the range
-    that a video states, else 16 to 235."""
     white: Annotated[float | None, Interval(gt=0), Flag("--white", "V", "Input")] = None
-    """The sample that is white in images of more than 8 bits. Default: the greatest number of 8,
-    10, 12, 14 or 16 bits, as many as the samples of some images need; 1 for fractions."""
 
 
 @dataclass(frozen=True)

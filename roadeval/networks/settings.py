@@ -23,53 +23,56 @@ class NetworkError(RoadevalError):
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class NetSettings:
-    """Settings of a network. Missing values are read from the file, and listed in ``run.toml``."""
+    """Settings of a network. Missing values are read from the file, and listed in ``run.toml``.
+
+    file: The network, an ONNX file.
+    sha256: SHA-256 of the network's bytes, followed by those of its weight files, in hexadecimal:
+        any other file is an error.
+    size: Width and height of the input in pixels. Default: those that the file states.
+    resize: Way to resize an image to the input, with linear interpolation. ``stretch``, the
+        default: each side by itself. ``letterbox``, the way of Ultralytics' networks: both sides by
+        one factor until the image fits, in the middle of a grey area.
+    antialias: Whether a pixel of a reduced image is a mean of all pixels that it covers, as with
+        Pillow's bilinear filter.
+    layout: Order of the input's dimensions: N images, C channels, H rows, W columns.
+    channels: Order of the input's channels, by default ``rgb``. ``grey``: a single channel.
+    scale: First factor of a grey level 0..255. Default: 1/255, or 1 if the network takes integers.
+    mean: Number to subtract then: one for each channel in the order of ``channels``, or one for
+        all. Default: 0.
+    deviation: Divisor of the difference: one for each channel in the order of ``channels``, or one
+        for all. Default: 1.
+    outputs: Names of the outputs that show road. A pixel is road if one of them calls it road.
+    road: Numbers of the classes that are road, from 0.
+    activation: Way to make probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of
+        each, or ``none`` if it holds probabilities, which is the default if test images give only
+        numbers from 0 to 1. ``classes``: it holds numbers of classes, which is the default for
+        integers.
+    decide: Rule for road: a class of ``road`` beats all others (``argmax``), or the probability of
+        road is above ``threshold``.
+    threshold: Number from 0 to 1, by default 0.5; without ``decide`` it means ``decide =
+        "threshold"``. With ``argmax`` it is the least share of road's best class in the best two.
+    seconds: Longest time for an image, in seconds. A network that takes longer fails.
+    megabytes: Greatest memory of the input or an output, in MiB. All arrays of an image together
+        may take eight times that.
+    """
 
     file: str = ""
-    """The network, an ONNX file."""
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
-    """SHA-256 of the network's bytes, followed by those of its weight files, in hexadecimal: any
-    other file is an error."""
     size: tuple[Side, Side] | None = None
-    """Width and height of the input in pixels. Default: those that the file states."""
     resize: Literal["stretch", "letterbox"] | None = None
-    """Way to resize an image to the input, with linear interpolation. ``stretch``, the default:
-    each side by itself. ``letterbox``, the way of Ultralytics' networks: both sides by one factor
-    until the image fits, in the middle of a grey area."""
     antialias: bool = False
-    """Whether a pixel of a reduced image is a mean of all pixels that it covers, as with Pillow's
-    bilinear filter."""
     layout: Literal["NCHW", "NHWC"] | None = None
-    """Order of the input's dimensions: N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None
-    """Order of the input's channels, by default ``rgb``. ``grey``: a single channel."""
     scale: Positive | None = None
-    """First factor of a grey level 0..255. Default: 1/255, or 1 if the network takes integers."""
     mean: Annotated[tuple[Number, ...], OfChannels] | None = None
-    """Number to subtract then: one for each channel in the order of ``channels``, or one for all.
-    Default: 0."""
     deviation: Annotated[tuple[Positive, ...], OfChannels] | None = None
-    """Divisor of the difference: one for each channel in the order of ``channels``, or one for all.
-    Default: 1."""
     outputs: tuple[str, ...] | None = None
-    """Names of the outputs that show road. A pixel is road if one of them calls it road."""
     road: Annotated[tuple[Class, ...], Field(max_length=64)] | None = None
-    """Numbers of the classes that are road, from 0."""
     activation: Literal["softmax", "sigmoid", "none", "classes"] | None = None
-    """Way to make probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of each, or
-    ``none`` if it holds probabilities, which is the default if test images give only numbers from 0
-    to 1. ``classes``: it holds numbers of classes, which is the default for integers."""
     decide: Literal["argmax", "threshold"] | None = None
-    """Rule for road: a class of ``road`` beats all others (``argmax``), or the probability of road
-    is above ``threshold``."""
     threshold: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Number from 0 to 1, by default 0.5; without ``decide`` it means ``decide = "threshold"``.
-    With ``argmax`` it is the least share of road's best class in the best two."""
     seconds: Positive = 30.0
-    """Longest time for an image, in seconds. A network that takes longer fails."""
     megabytes: Annotated[int, Field(ge=1, le=65536)] = 512
-    """Greatest memory of the input or an output, in MiB. All arrays of an image together may take
-    eight times that."""
 
     @property
     def channel_count(self) -> int:

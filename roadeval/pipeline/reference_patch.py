@@ -16,16 +16,18 @@ Share = Annotated[float, Interval(ge=0, le=1)]
 
 @dataclass(frozen=True)
 class ReferencePatch:
-    """A trapezoid, symmetric about the image's middle; all as shares of height and width."""
+    """A trapezoid, symmetric about the image's middle; all as shares of height and width.
+
+    top: First row, from the image's upper edge.
+    bottom: Last row, above the vehicle's own bonnet.
+    top_width: Width of the upper edge.
+    bottom_width: Width of the lower edge.
+    """
 
     top: Share = 0.75
-    """First row, from the image's upper edge."""
     bottom: Share = 0.95
-    """Last row, above the vehicle's own bonnet."""
     top_width: Share = 0.2
-    """Width of the upper edge."""
     bottom_width: Share = 0.4
-    """Width of the lower edge."""
 
     def __post_init__(self) -> None:
         if self.top >= self.bottom:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import FILTERED, UNFILTERED
@@ -41,15 +42,20 @@ def document(findings: Findings | FleetFolder) -> Report:
 
 
 def page_document(
-    findings: Findings | FleetFolder, browsed: FrameBrowser | None, worst_frames: int = 0
+    findings: Findings | FleetFolder,
+    browsed: FrameBrowser | None,
+    worst_frames: int = 0,
+    folder: Path = Path(),
 ) -> Report:
     """Return the report as a page: with a browser of frames, or a table of all drives.
 
-    ``worst_frames`` limits the worst frames of many drives.
+    ``worst_frames`` limits the pictures of worst frames of many drives, those over all and those
+    drive by drive; the page is for a ``folder``, from which pages of drives are linked.
     """
     if isinstance(findings, FleetFolder):
+        along = partial(drives.along, most=worst_frames, beside=folder)
         worst = partial(drives.worst, across=ACROSS, most=worst_frames)
-        parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
+        parts: tuple[Section, ...] = (drives.table, along, worst, drives.plots, drives.strata)
         return _compose(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)

@@ -1,18 +1,18 @@
 """Settings: the fields of a dataclass, each with its meaning, its checks and the flag that sets it.
 
-The meaning of a field is the string after it; range, checks and flag are metadata of its type.
+The meaning of a field stands in the docstring of its class, as ``name: text`` with further lines
+indented; range, checks and flag are metadata of its type.
 """
 
 from __future__ import annotations
 
-import ast
 import inspect
-import sys
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from itertools import pairwise
-from typing import Any
+from typing import Any, Final
+
+_FIELD: Final = re.compile(r"^(\w+): (.+(?:\n {4}.+)*)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -41,27 +41,10 @@ class Checked:
 
 
 def meanings(kind: type) -> Mapping[str, str]:
-    """Return the string after each field of a class, and of its bases; none without a source."""
+    """Return the meaning of each field of a class, and of its bases, by their docstrings."""
     texts: dict[str, str] = {}
     for base in reversed(kind.__mro__):
-        texts |= read_meanings(base.__module__).get(base.__qualname__, {})
-    return texts
-
-
-@cache
-def read_meanings(module: str) -> Mapping[str, Mapping[str, str]]:
-    """Return the strings after the fields of a module's classes."""
-    try:
-        source = inspect.getsource(sys.modules[module])
-    except (KeyError, OSError, TypeError):
-        return {}
-    texts: dict[str, dict[str, str]] = {}
-    for described in ast.parse(source).body:
-        for field, after in pairwise(getattr(described, "body", ())):
-            match field, after:
-                case (
-                    ast.AnnAssign(target=ast.Name(name)),
-                    ast.Expr(value=ast.Constant(value=str(text))),
-                ) if isinstance(described, ast.ClassDef):
-                    texts.setdefault(described.name, {})[name] = inspect.cleandoc(text)
+        for name, text in _FIELD.findall(inspect.cleandoc(base.__doc__ or "")):
+            if name in vars(base).get("__annotations__", {}):
+                texts[name] = " ".join(text.split())
     return texts

@@ -15,40 +15,44 @@ from roadeval.runtime.settings import Flag
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """Which frames and pixels train a model that is not read from a file."""
+    """Which frames and pixels train a model that is not read from a file.
+
+    model: A model made by 'roadeval train' from other drives. Default: the log itself trains one.
+    adapt: Let the model learn further from the drive's first frames, which are then not evaluated.
+        The result is then not one on a drive that the model has not seen. The reference patch alone
+        is used only if ``source`` insists on it: it may make the model worse.
+    source: ``auto``: the log's truth if it has one, else the reference patch; ``truth`` or
+        ``patch`` insists.
+    frames: Labelled frames to train on, which are never evaluated. All frames count for ``patch``.
+        They stay in memory.
+    placement: The ``first`` labelled frames, or some ``spread`` along the drive. Frames at equal
+        distances show all its light and places: the result then holds for a drive with labels here
+        and there, not for frames after the labelled ones.
+    gap: Frames to leave out after the training frames, or on both sides. The neighbours of a
+        training frame look like it, and flatter the result. Default: 0; spread: a quarter of their
+        distance.
+    pixels_per_class: Road pixels, and non-road pixels, drawn from each training frame.
+    max_pixels: Upper bound for all frames and classes: the SVM's training time grows with its
+        square.
+    seed: Seed of the draw. Another seed draws other pixels, and gives other rates.
+    patch: Self-supervision: the trapezoid in front of the vehicle that is taken for road.
+    horizon: Self-supervision: pixels above this share of the height are not road.
+    far: Self-supervision: pixels below the horizon and nearer to the patch than this are road, all
+        others are not; see `roadeval.pipeline.scene.reach`. Most roads end at 1.
+    """
 
     model: Annotated[str | None, Flag("--model", "FILE")] = None
-    """A model made by 'roadeval train' from other drives. Default: the log itself trains one."""
     adapt: Annotated[bool, Flag("--adapt")] = False
-    """Let the model learn further from the drive's first frames, which are then not evaluated. The
-    result is then not one on a drive that the model has not seen. The reference patch alone is
-    used only if ``source`` insists on it: it may make the model worse."""
     source: Literal["auto", "truth", "patch"] = "auto"
-    """``auto``: the log's truth if it has one, else the reference patch; ``truth`` or ``patch``
-    insists."""
     frames: Annotated[int, Interval(ge=0, le=1000), Flag("--train-frames", "N")] = 10
-    """Labelled frames to train on, which are never evaluated. All frames count for ``patch``. They
-    stay in memory."""
     placement: Annotated[Literal["first", "spread"], Flag("--train-on", "WHERE")] = "first"
-    """The ``first`` labelled frames, or some ``spread`` along the drive. Frames at equal distances
-    show all its light and places: the result then holds for a drive with labels here and there,
-    not for frames after the labelled ones."""
     gap: Annotated[int | None, Interval(ge=0, le=1_000_000_000), Flag("--train-gap", "N")] = None
-    """Frames to leave out after the training frames, or on both sides. The neighbours of a training
-    frame look like it, and flatter the result. Default: 0; spread: a quarter of their distance."""
     pixels_per_class: Annotated[int, Interval(ge=1, le=1_000_000_000)] = 200
-    """Road pixels, and non-road pixels, drawn from each training frame."""
     max_pixels: Annotated[int, Interval(ge=2, le=100_000)] = 8000
-    """Upper bound for all frames and classes: the SVM's training time grows with its square."""
     seed: Annotated[int, Interval(ge=0, le=1_000_000_000)] = 0
-    """Seed of the draw. Another seed draws other pixels, and gives other rates."""
     patch: ReferencePatch = field(default_factory=ReferencePatch)
-    """Self-supervision: the trapezoid in front of the vehicle that is taken for road."""
     horizon: Share = 0.4
-    """Self-supervision: pixels above this share of the height are not road."""
     far: Annotated[float, Interval(gt=0, le=1_000_000)] = 1.0
-    """Self-supervision: pixels below the horizon and nearer to the patch than this are road, all
-    others are not; see `roadeval.pipeline.scene.reach`. Most roads end at 1."""
 
     def __post_init__(self) -> None:
         if self.adapt and self.model is None:

@@ -29,12 +29,12 @@ from tests.report.making import a_difference, a_total
 from tests.results.making import facts_of
 
 
-def screen(labelled=0, recording=None, files=(), **parts):
+def screen(labelled=0, recording=None, files=(), errors=(), **parts):
     """The screen of a drive of which nothing was scored unless there are totals."""
     frames = FrameAccount(39, 39, labelled=labelled, skipped={"unlabelled": 39})
     facts = facts_of(drive=DriveFacts("drive"), frames=frames, **parts)
     out = Console(file=io.StringIO(), width=80)
-    outcome.show(Outcome(recording, Path("reports"), facts, (), (), files), out)
+    outcome.show(Outcome(recording, Path("reports"), facts, (), (), files, errors=errors), out)
     outcome.show_verdict(facts, out)
     return out.file.getvalue()
 
@@ -115,6 +115,15 @@ def test_the_figures_are_named_once_and_the_verdict_stands_last():
     shown = screen(1, files=files, totals={"filtered": a_mask()}, verdict="filtered: fine.")
     assert "figures    reports/fig2_masks.png\n" in shown
     assert shown.endswith("\n\nfiltered: fine.\n")
+
+
+def test_the_error_along_the_drive_is_a_line_of_bars():
+    shown = screen(1, errors=(0.0, 0.2, 0.4), totals={"filtered": a_mask()})
+    assert "\nerror      ▁▄█ up to 40.0 % (filtered)\n" in shown
+    many = screen(1, errors=(0.4, *[0.0] * 999), totals={"filtered": a_mask()})
+    (line,) = [line for line in many.splitlines() if line.startswith("error ")]
+    assert line.startswith("error      █▁")
+    assert len(line) <= 80
 
 
 @pytest.mark.parametrize(

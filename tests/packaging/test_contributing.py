@@ -179,6 +179,7 @@ def test_the_stage_has_rows_a_mask_in_the_recording_and_documented_settings(work
     assert frames["ERR"].max() < 0.05
     mask = recording.layer("bright", "brightness", FRAMES - 1)
     np.testing.assert_array_equal(mask, frame(FRAMES - 1)[1] == 255)
+    assert "# Greatest distance of a road pixel" in workshop.done("config")
     assert "tolerance = 50" in workshop.done("config")
 
 

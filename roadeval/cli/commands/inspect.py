@@ -57,8 +57,8 @@ def inspect(
         roadeval inspect recordings/drive.rrd --list
         roadeval inspect recordings/drive.rrd --worst 1 --screenshot worst.png
 
-    The viewer works offline and listens on 127.0.0.1 alone. Among neighbouring frames only the
-    worst is listed. In a fleet the frames of all drives are ranked together, and the worst one
+    The viewer works offline and listens on 127.0.0.1 alone. Of each scene only the worst frame
+    is listed. In a fleet the frames of all drives are ranked together, and the worst one
     opens by default.
     """
     if frame is not None and worst is not None:

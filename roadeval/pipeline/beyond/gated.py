@@ -106,12 +106,15 @@ COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image"
 
 @stage_settings
 class GatedSettings:
-    """Settings of the gated filter."""
+    """Settings of the gated filter.
+
+    odds: Factor of the odds that a candidate is shaded road. A greater one brings back more dark
+        road, and brightens more pixels that are not road. A classifier on colours takes all of
+        those for road, and needs a small factor; one that sees place and surroundings as well works
+        with 1.
+    """
 
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
-    """Factor of the odds that a candidate is shaded road. A greater one brings back more dark road,
-    and brightens more pixels that are not road. A classifier on colours takes all of those for
-    road, and needs a small factor; one that sees place and surroundings as well works with 1."""
 
 
 @dataclass(frozen=True, eq=False)

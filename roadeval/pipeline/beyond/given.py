@@ -13,10 +13,12 @@ GIVEN: Final = mask_spec("given", "Road by another method")
 
 @stage_settings
 class GivenSettings:
-    """Settings of another method's masks as a stage."""
+    """Settings of another method's masks as a stage.
+
+    name: Variant that the masks belong to, one of ``[masks]`` or ``topics.masks``.
+    """
 
     name: str = ""
-    """Variant that the masks belong to, one of ``[masks]`` or ``topics.masks``."""
 
 
 @per_view

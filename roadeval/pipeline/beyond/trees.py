@@ -206,24 +206,26 @@ GEODESIC: Final = LayerSpec(
 
 @stage_settings
 class TreesSettings:
-    """Settings of the boosted trees."""
+    """Settings of the boosted trees.
+
+    width: Columns of the working image.
+    features: Groups of features, see `roadeval.pipeline.beyond.features`.
+    opinion: Whether the output of the stage before is a feature, too: its log-odds of road, or the
+        distance to its mask's edge.
+    trees: Number of trees. The time of a decision grows with it.
+    reach_weight: ``reach_weight`` times ``s max(d - 1, 0)`` is subtracted from the log-odds. The
+        distance d from the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the
+        light and 0 in the shade. Default: 1 if images of the frame's size taught the trees, which
+        are taken for the camera's own; 4 if other cameras taught them: there it may correct much.
+    threshold: A pixel is road if its probability of road is above this.
+    """
 
     width: Annotated[int, Field(ge=32, le=1024)] = 160
-    """Columns of the working image."""
     features: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(GROUPS)
-    """Groups of features, see `roadeval.pipeline.beyond.features`."""
     opinion: bool = False
-    """Whether the output of the stage before is a feature, too: its log-odds of road, or the
-    distance to its mask's edge."""
     trees: Annotated[int, Field(ge=1, le=10_000)] = 150
-    """Number of trees. The time of a decision grows with it."""
     reach_weight: Annotated[float, Field(ge=0, le=100)] | None = None
-    """``reach_weight`` times ``s max(d - 1, 0)`` is subtracted from the log-odds. The distance d
-    from the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
-    the shade. Default: 1 if images of the frame's size taught the trees, which are taken for the
-    camera's own; 4 if other cameras taught them: there it may correct much."""
     threshold: Share = 0.5
-    """A pixel is road if its probability of road is above this."""
 
     @field_validator("features")
     @classmethod

@@ -27,21 +27,23 @@ BOUNDARY: Final = mask_spec(
 
 @stage_settings
 class PostSettings:
-    """Settings of phase 4."""
+    """Settings of phase 4.
+
+    element: Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 %
+        of the image's width, at least 3.
+    operations: ``open`` (Eq. 20) and ``close`` (Eq. 21) in the order of application. Section 4.4
+        begins with dilation and erosion, a closing. On a noisy mask a closing joins the road to its
+        surroundings, and no opening parts them again: without the filter it costs 4 and 10 points
+        of ERR on two real drives (on three synthetic ones it gains 8 and 6 and costs 1). So the
+        opening comes first here; the presets ``printed_order`` and ``printed`` close first.
+    region: Components to keep: the ``largest``, or ``all``.
+    fill: Whether the holes of the kept components are filled (Eq. 23).
+    """
 
     element: Annotated[int, Field(ge=1, le=999)] | None = None
-    """Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 % of the
-    image's width, at least 3."""
     operations: tuple[Literal["open", "close"], ...] = ("open", "close")
-    """``open`` (Eq. 20) and ``close`` (Eq. 21) in the order of application. Section 4.4 begins with
-    dilation and erosion, a closing. On a noisy mask a closing joins the road to its surroundings,
-    and no opening parts them again: without the filter it costs 4 and 10 points of ERR on two real
-    drives (on three synthetic ones it gains 8 and 6 and costs 1). So the opening comes first here;
-    the presets ``printed_order`` and ``printed`` close first."""
     region: Literal["largest", "all"] = "largest"
-    """Components to keep: the ``largest``, or ``all``."""
     fill: bool = True
-    """Whether the holes of the kept components are filled (Eq. 23)."""
 
     @field_validator("element")
     @classmethod

@@ -50,27 +50,30 @@ COMPENSATED: Final = LayerSpec(
 
 @stage_settings
 class ShadowSettings:
-    """Settings of the shadow filter."""
+    """Settings of the shadow filter.
+
+    threshold: ``otsu``: the between-class variance of Otsu (1979); ``printed``: Eq. 7 with the
+        definitions printed beside it, which lands at the edge of the histogram.
+    inclusive: Whether the code of the threshold itself is shadow, as printed in Eq. 8. Otsu's upper
+        class begins above it.
+    connectivity: Neighbours that make one component (Eq. 9): 8 or 4.
+    ring_width: Number of 3x3 dilations that make a buffer ring (Eq. 10), at most 16: the work grows
+        with its square.
+    max_gain: Upper bound of the contrast gain of Eq. 11; none as printed. Gains above 3 are common.
+    statistic: ``deviation``: ``mu_ring + (I - mu) * sigma_ring / sigma``, which gives the component
+        its ring's mean and standard deviation; ``printed``: Eq. 11 literally, variances and
+        inverted.
+    colour_space: Colour space of the compensation: ``rgb``, or ``hsi`` (S and V of Eq. 3-5, hue
+        unchanged, converted back by step 5 of section 4.2).
+    """
 
     threshold: Literal["otsu", "printed"] = "otsu"
-    """``otsu``: the between-class variance of Otsu (1979); ``printed``: Eq. 7 with the definitions
-    printed beside it, which lands at the edge of the histogram."""
     inclusive: bool = False
-    """Whether the code of the threshold itself is shadow, as printed in Eq. 8. Otsu's upper class
-    begins above it."""
     connectivity: Literal[4, 8] = 8
-    """Neighbours that make one component (Eq. 9): 8 or 4."""
     ring_width: Annotated[int, Field(ge=1, le=16)] = 1
-    """Number of 3x3 dilations that make a buffer ring (Eq. 10), at most 16: the work grows with its
-    square."""
     max_gain: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
-    """Upper bound of the contrast gain of Eq. 11; none as printed. Gains above 3 are common."""
     statistic: Literal["deviation", "printed"] = "deviation"
-    """``deviation``: ``mu_ring + (I - mu) * sigma_ring / sigma``, which gives the component its
-    ring's mean and standard deviation; ``printed``: Eq. 11 literally, variances and inverted."""
     colour_space: Literal["rgb", "hsi"] = "rgb"
-    """Colour space of the compensation: ``rgb``, or ``hsi`` (S and V of Eq. 3-5, hue unchanged,
-    converted back by step 5 of section 4.2)."""
 
 
 def value(rgb: Plane) -> Floats:

@@ -31,11 +31,14 @@ SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
 @stage_settings
 class SimilaritySettings:
-    """Settings of phase 1."""
+    """Settings of phase 1.
+
+    quantile: A pixel is road if ``d^2`` is at most this quantile of the chi-squared distribution
+        with 3 degrees of freedom: the share of normally distributed road colours that count as
+        road.
+    """
 
     quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
-    """A pixel is road if ``d^2`` is at most this quantile of the chi-squared distribution with 3
-    degrees of freedom: the share of normally distributed road colours that count as road."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,18 +43,20 @@ _BLOCK: Final = 1 << 17
 
 @stage_settings
 class SvmSettings:
-    """Settings of phase 3."""
+    """Settings of phase 3.
+
+    kernel: ``rbf``, an adaptation of the printed machine: road is a mid grey between dark verges
+        and bright sky, which no plane in RGB separates; or ``linear``, as printed (Eq. 12).
+    c: Penalty of a training pixel on the wrong side. The printed Eq. 13 allows none, which has no
+        solution for classes that overlap.
+    gamma: Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours.
+    threshold: A pixel is road if the decision function is above this.
+    """
 
     kernel: Literal["rbf", "linear"] = "rbf"
-    """``rbf``, an adaptation of the printed machine: road is a mid grey between dark verges and
-    bright sky, which no plane in RGB separates; or ``linear``, as printed (Eq. 12)."""
     c: Penalty = 1.0
-    """Penalty of a training pixel on the wrong side. The printed Eq. 13 allows none, which has no
-    solution for classes that overlap."""
     gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
-    """Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours."""
     threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    """A pixel is road if the decision function is above this."""
 
 
 @dataclass(frozen=True, eq=False)
