@@ -22,7 +22,7 @@ from sklearn.metrics import (
 
 import roadeval
 from roadeval.config.run import RunConfig
-from roadeval.data import BASELINE, FINAL_STAGE, UNFILTERED, Frame
+from roadeval.data import BASELINE, FINAL_STAGE, Frame
 from roadeval.evaluation.metres import plan_of
 from roadeval.geometry.ground import ground_of
 from roadeval.runtime.threads import one_thread_each
@@ -32,6 +32,7 @@ DEMO: Final = Path(__file__).resolve().parents[2] / "recordings" / "demo.mcap"
 CAMERA: Final = {"height": 1.42, "pitch": 2.9, "focal": [560]}
 CLOSE: Final = 1e-12
 """How far the two values of a number may lie apart."""
+PRESET: Final = "robust"
 STAGE: Final = "trees"
 """The stage of `robust` that says how probable road is."""
 READ: Final = (
@@ -293,7 +294,7 @@ def replay_demo(**more: Mapping[str, Any]) -> tuple[int, dict[str, float], Pixel
 
     All frames of the demo drive are read unless ``more`` tables of the configuration say otherwise.
     """
-    tables = {"preset": "robust", "ground": CAMERA, "output": {"record": "masks", "figures": False}}
+    tables = {"preset": PRESET, "ground": CAMERA, "output": {"record": "masks", "figures": False}}
     config = roadeval.configure({**tables, **more})
     with TemporaryDirectory() as folder:
         path = Path(folder)
@@ -323,12 +324,12 @@ def compare_libraries(evaluated: int, ours: Mapping[str, float], pixels: Pixels)
 
 def _printed(summary: dict[str, Any], metres: pd.DataFrame) -> Iterator[tuple[str, float]]:
     """Yield roadeval's numbers of the final mask by `Overlap.key`."""
-    yield from summary["totals"][UNFILTERED][FINAL_STAGE].items()
-    yield from summary["beyond"][UNFILTERED].items()
-    curve = summary["curves"][UNFILTERED][STAGE]
+    yield from summary["totals"][PRESET][FINAL_STAGE].items()
+    yield from summary["beyond"][PRESET].items()
+    curve = summary["curves"][PRESET][STAGE]
     yield from ((f"curve_{name}", value) for name, value in curve.items())
     above = metres[metres["where"] == "from_above"]
-    for variant, prefix in ((UNFILTERED, ""), (BASELINE, f"{BASELINE}_")):
+    for variant, prefix in ((PRESET, ""), (BASELINE, f"{BASELINE}_")):
         rows = above[above["variant"] == variant]
         taken = rows["measure"].isin(["MaxF", "AP11", "F1"])
         values = rows[taken].set_index("measure")["value"]
@@ -352,10 +353,10 @@ def _pixels(recording: roadeval.Recording, config: RunConfig) -> Pixels:
     cells = plan_of(ground, config.evaluation).cells.ravel()
     pixels = Pixels(truth, [], [], [], cells[cells >= 0])
     for number in evaluated:
-        result = roadeval.run_frame(recording.image(number), model, config, variant=UNFILTERED)
+        result = roadeval.run_frame(recording.image(number), model, config, variant=PRESET)
         (code,) = (step.output.probability for step in result.stages if step.stage == STAGE)
         assert code is not None
-        pixels.mask.append(recording.layer(UNFILTERED, FINAL_STAGE, number))
+        pixels.mask.append(recording.layer(PRESET, FINAL_STAGE, number))
         pixels.code.append(code)
         pixels.blind.append((model.prior >= 0.5).astype(np.uint8))
     return pixels

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -24,7 +24,7 @@ from roadeval.config.run import RunConfig
 from roadeval.config.variants import network_variant
 from roadeval.data import FINAL_STAGE
 
-NAMES: Final = {"robust": "unfiltered", "network": "net", "threshold": "at", "tuned": "net_tuned"}
+NAMES: Final = {"robust": "robust", "network": "net", "threshold": "at", "tuned": "net_tuned"}
 """The compared methods, and their variants."""
 
 
@@ -39,13 +39,16 @@ def measure(sources: Sources, network: Path) -> dict[str, Any]:
 
 def _on(name: str, sources: Sources, network: Path) -> dict[str, Any]:
     drive = DRIVES[name]
+    places = [sources.work / f"{name}.tuned.{seed}" for seed in range(SEEDS_OF_ROBUST)]
     summaries = []
-    for seed in range(SEEDS_OF_ROBUST):
+    for seed, reports in enumerate(places):
         tables = {"labels": drive.labels, "training": {"seed": seed}}
-        config, reports = _config(tables, sources, network), sources.work / f"{name}.tuned.{seed}"
+        config = _config(tables, sources, network)
         outcome = roadeval.replay(drive.find(sources, name), config, reports=reports)
         summaries.append(outcome.summary)
-    return of_summaries(summaries)
+    compared = roadeval.compare(places[0], variants=["robust", "net_tuned"])
+    (tuned,) = compared.comparison.finals()
+    return of_summaries(summaries, asdict(tuned.difference["ERR"]))
 
 
 def _config(tables: dict[str, Any], sources: Sources, network: Path) -> RunConfig:
@@ -83,8 +86,12 @@ def told_of_idd(blind: idd.Counted, counted: Mapping[str, list[idd.Counted]]) ->
     }
 
 
-def of_summaries(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def of_summaries(
+    summaries: Sequence[Mapping[str, Any]], change: Mapping[str, Any]
+) -> dict[str, Any]:
     """Return the numbers of the summaries of replays, one a seed of the training from 0.
+
+    ``change`` is the difference of ERR between the tuned network and `robust`, with the first seed.
 
     The unchanged network learns nothing: its ERR is there once.
     """
@@ -102,7 +109,7 @@ def of_summaries(summaries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "blind": totals["blind"][FINAL_STAGE]["ERR"],
             "own": summary["thresholds"]["net"]["own"],
             "chosen": summary["thresholds"]["net"]["threshold"],
-            "change": change_of(summary["against_unfiltered"]["net_tuned"]["ERR"]),
+            "change": change_of(change),
             "against_network": change_of(summary["against_method"]["net_tuned"]["ERR"]),
             **errors,
         }

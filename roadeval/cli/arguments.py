@@ -128,12 +128,10 @@ def _first_brought(config: RunConfig, options: OptionValues) -> RunConfig:
 
     It has no other by itself: by default computed variants come before masks of other methods.
     """
-    from roadeval.results.facts import focus_of
-
     methods = ("variants", "nets", "topics.masks", "masks")
-    names = config.names()
+    names = config.brought()
     typed = [name for o in options if o in methods for name, _ in options[o] if name in names]
-    if config.output.focus or focus_of(names) not in typed[1:]:
+    if config.output.focus or not names or names[0] not in typed[1:]:
         return config
     return config.override({"output": {"focus": typed[0]}})
 

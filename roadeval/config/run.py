@@ -73,7 +73,8 @@ class RunConfig(LogConfig):
     preset: str = "paper"
     """The preset to which the other settings are changes."""
     pipeline: Pipeline = field(default_factory=lambda: pipeline_of(None, PRESETS["paper"]))
-    """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings."""
+    """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings; if
+    the preset has no filter, that of a variant with the preset's name."""
     extra: tuple[Variant, ...] = ()
     """Further variants."""
     only: tuple[str, ...] = ()
@@ -92,7 +93,7 @@ class RunConfig(LogConfig):
 
     def __post_init__(self) -> None:
         LogConfig.__post_init__(self)
-        names = {variant.name for variant in variants_of(self.pipeline, self.extra)}
+        names = {variant.name for variant in variants_of(self.pipeline, self.extra, self.preset)}
         for name in (*self.topics.masks, *self.masks):
             check_variant_name(name, names)
             names.add(name)
@@ -138,7 +139,10 @@ class RunConfig(LogConfig):
     def variants(self) -> tuple[Variant, ...]:
         """Return the variants that are computed: the two by default, then the extra ones."""
         trained = [name for name, masks in self.masks.items() if masks.decide == TRAINED]
-        variants = (*variants_of(self.pipeline, self.extra), *map(thresholded_variant, trained))
+        variants = (
+            *variants_of(self.pipeline, self.extra, self.preset),
+            *map(thresholded_variant, trained),
+        )
         return tuple(v for v in variants if not self.only or v.name in self.only)
 
     def names(self) -> list[str]:
@@ -147,6 +151,11 @@ class RunConfig(LogConfig):
         masks = [name for named in (*topics, self.masks) for name in named]
         names = dict.fromkeys([*(variant.name for variant in self.variants()), *masks])
         return [name for name in names if not self.only or name in self.only]
+
+    def brought(self) -> list[str]:
+        """Name the variants that were brought beside those of the preset, as in `names`."""
+        given = {variant.name for variant in variants_of(self.pipeline, (), self.preset)}
+        return [name for name in self.names() if name not in given]
 
     def check_focus(self, names: Iterable[str]) -> None:
         """Raise a `ConfigError` if the chosen focus is none of these variants."""
@@ -187,7 +196,8 @@ class RunConfig(LogConfig):
     def resolved(self) -> RunConfig:
         """Return the configuration with the settings that stages read from files.
 
-        A `RoadevalError` if a file cannot be used, or no stage of a variant makes a mask for its
+        What was brought is the focus beside a preset that has its name as a variant. A
+        `RoadevalError` if a file cannot be used, or no stage of a variant makes a mask for its
         final stage.
         """
         for name, pipeline in self.pipelines().items():
@@ -195,7 +205,12 @@ class RunConfig(LogConfig):
                 chain = ", ".join(pipeline.chain)
                 problem = f"its chain ({chain}) has no stage before {FINAL_STAGE} that makes a "
                 raise ConfigError(f"{problem}road mask", where=f"variant {name}")
-        return self._with_pipelines(Pipeline.resolved)
+        config = self._with_pipelines(Pipeline.resolved)
+        brought = self.brought()
+        by_itself = focus_of(self.names())
+        if self.output.focus is None and brought and by_itself not in brought:
+            config = replace(config, output=replace(self.output, focus=brought[0]))
+        return config
 
     def without_places(self) -> RunConfig:
         """Return the configuration without the stages' settings that are paths of files."""
@@ -246,7 +261,9 @@ class RunConfig(LogConfig):
 
         A `ConfigError` if there is no such method, or it learns itself; see `tuned_variant`.
         """
-        pipelines = {v.name: v.pipeline for v in variants_of(self.pipeline, self.extra)}
+        pipelines = {
+            v.name: v.pipeline for v in variants_of(self.pipeline, self.extra, self.preset)
+        }
         masks = {*self.topics.masks, *self.masks}
         variants = []
         for name in names:

@@ -115,16 +115,21 @@ class Variant:
         return VariantLayout(self.name, title, self.pipeline.masks(), self.pipeline.layers())
 
 
-def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, ...]:
+def variants_of(
+    pipeline: Pipeline, extra: Iterable[Variant], preset: str = "paper"
+) -> tuple[Variant, ...]:
     """Return the variants of a run: with the pipeline's filters, without them, and the extra ones.
 
-    A pipeline without a filter gives the unfiltered variant alone. A `ConfigError` if the name of
-    an extra variant is taken, reserved, or no plain word.
+    A pipeline without a filter gives one variant, which has the name of its preset if that has no
+    filter, either. A `ConfigError` if the name of an extra variant is taken, reserved, or no plain
+    word.
     """
     unfiltered = pipeline.without_filter()
     has_filter = unfiltered != pipeline
     variants = [Variant(FILTERED, pipeline)] if has_filter else []
-    variants.append(Variant(UNFILTERED, unfiltered, of_pair=has_filter))
+    filters = [stage.is_filter for stage in _stages_of(PRESETS[preset]["chain"])]
+    name = UNFILTERED if has_filter or any(filters) else preset
+    variants.append(Variant(name, unfiltered, of_pair=has_filter))
     for variant in extra:
         check_variant_name(variant.name, {other.name for other in variants})
         variants.append(variant)

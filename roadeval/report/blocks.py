@@ -301,6 +301,18 @@ class Strip(Block):
 
 
 @dataclass(frozen=True)
+class DriveRow(Block):
+    """A drive of many on a page: an error rate along the drive, and its worst frames."""
+
+    name: str
+    note: str
+    chart: Chart
+    address: str = ""
+    """The address of the drive's page; empty without one."""
+    pictures: Sequence[tuple[str, ImageFile]] = ()
+
+
+@dataclass(frozen=True)
 class LinkList(Block):
     """Titles of links with their addresses; paper has none."""
 

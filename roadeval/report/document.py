@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from pathlib import Path
 from typing import Any, Final
 
+from roadeval.data import FILTERED, UNFILTERED
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
@@ -40,15 +42,20 @@ def document(findings: Findings | FleetFolder) -> Report:
 
 
 def page_document(
-    findings: Findings | FleetFolder, browsed: FrameBrowser | None, worst_frames: int = 0
+    findings: Findings | FleetFolder,
+    browsed: FrameBrowser | None,
+    worst_frames: int = 0,
+    folder: Path = Path(),
 ) -> Report:
     """Return the report as a page: with a browser of frames, or a table of all drives.
 
-    ``worst_frames`` limits the worst frames of many drives.
+    ``worst_frames`` limits the pictures of worst frames of many drives, those over all and those
+    drive by drive; the page is for a ``folder``, from which pages of drives are linked.
     """
     if isinstance(findings, FleetFolder):
+        along = partial(drives.along, most=worst_frames, beside=folder)
         worst = partial(drives.worst, across=ACROSS, most=worst_frames)
-        parts: tuple[Section, ...] = (drives.table, worst, drives.plots, drives.strata)
+        parts: tuple[Section, ...] = (drives.table, along, worst, drives.plots, drives.strata)
         return _compose(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
@@ -90,7 +97,8 @@ def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
             yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
         if facts.drive.rate_hz:
             yield f"{facts.drive.rate_hz:.4g} Hz"
-    if preset:
+    variants = getattr(findings.facts, "settings", findings.facts.finals)
+    if preset and {FILTERED, UNFILTERED, preset} & {*variants}:  # else it has not run
         yield f"preset {preset}"
     if version:
         yield f"roadeval {version}"

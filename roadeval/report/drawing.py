@@ -192,7 +192,8 @@ def _positions(chart: Chart, frames: AxisRange | None) -> tuple[AxisRange, list[
         return x, [(x.percent(t), f"{t:.0f}") for t in ticks(x, _X_TICKS) if t == int(t)]
     if chart.across:
         numbers = [number for series in chart.series for number in series.x]
-        x = _with_room(AxisRange(*(chart.x_range or (min(numbers), max(numbers)))))
+        x = AxisRange(*(chart.x_range or (min(numbers), max(numbers))))
+        x = x if chart.low else _with_room(x)
         return x, _number_ticks(x)
     x = AxisRange(-0.3, len(chart.names) - 0.7)
     return x, [(x.percent(position), name) for position, name in enumerate(chart.names)]

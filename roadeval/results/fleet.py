@@ -69,7 +69,7 @@ WORST: Final = 50
 """Number of frames in the table of the worst."""
 OF_A_DRIVE: Final = 3
 """Frames of a drive that are among its worst, at most."""
-APART_NS: Final = 1_000_000_000
+APART_NS: Final = 3_000_000_000
 """Neighbours fail alike: of frames less than this apart only the worst counts."""
 CACHED: Final = ("frames", "regions", "scores", "worst")
 """Tables of each drive that are cached in folders of these names; ``regions`` of final masks."""
@@ -255,6 +255,12 @@ class FleetFolder:
             for _, of_drive in group_rows(frames, ["drive"])
         ]
         return rank_worst(concatenate([frames[:0], *parts]))
+
+    @cached_property
+    def pictured(self) -> pd.DataFrame:
+        """The rows of ``worst`` of every drive, not of the worst frames of all alone."""
+        scored = self.focus_scores["drive"]
+        return read_parquet([cached_path(self.path, "worst", drive) for drive in scored], "worst")
 
     def picture(self, frame: Mapping[str, Any]) -> bytes | None:
         """Return the JPEG of a row of ``worst``; None if it lies elsewhere, or is cut off."""

@@ -145,14 +145,15 @@ def step_by_step(parts: Mapping[str, float]) -> str:
 
     ``parts`` are in percent: the error of the first mask, and the addition of each further step.
 
-    >>> step_by_step({"svm": 15.0, "filter": -1.2, "post": 0.6})
-    'svm without the filter leaves 15.0 % wrong, the filter removes 1.2 pp, post adds 0.6 pp'
+    >>> step_by_step({"svm": 15.0, "filter": -1.2})
+    'svm without the filter leaves 15.0 % wrong, the filter removes 1.2 points'
     """
     (first, error), *rest = parts.items()
     without = " without the filter" if FILTER in parts else ""
     steps = (
-        f"{'the ' * (name == FILTER)}{name} {'adds' if cost >= 0 else 'removes'} {abs(cost):.1f} pp"
+        f"{'the ' * (name == FILTER)}{name} {verb} {abs(cost):.1f} points"
         for name, cost in rest
+        for verb in ["adds" if cost >= 0 else "removes"]
     )
     return ", ".join([f"{first}{without} leaves {error:.1f} % wrong", *steps])
 

@@ -29,12 +29,12 @@ from tests.report.making import a_difference, a_total
 from tests.results.making import facts_of
 
 
-def screen(labelled=0, recording=None, files=(), **parts):
+def screen(labelled=0, recording=None, files=(), errors=(), **parts):
     """The screen of a drive of which nothing was scored unless there are totals."""
     frames = FrameAccount(39, 39, labelled=labelled, skipped={"unlabelled": 39})
     facts = facts_of(drive=DriveFacts("drive"), frames=frames, **parts)
     out = Console(file=io.StringIO(), width=80)
-    outcome.show(Outcome(recording, Path("reports"), facts, (), (), files), out)
+    outcome.show(Outcome(recording, Path("reports"), facts, (), (), files, errors=errors), out)
     outcome.show_verdict(facts, out)
     return out.file.getvalue()
 
@@ -117,6 +117,15 @@ def test_the_figures_are_named_once_and_the_verdict_stands_last():
     assert shown.endswith("\n\nfiltered: fine.\n")
 
 
+def test_the_error_along_the_drive_is_a_line_of_bars():
+    shown = screen(1, errors=(0.0, 0.2, 0.4), totals={"filtered": a_mask()})
+    assert "\nerror      ▁▄█ up to 40.0 % (filtered)\n" in shown
+    many = screen(1, errors=(0.4, *[0.0] * 999), totals={"filtered": a_mask()})
+    (line,) = [line for line in many.splitlines() if line.startswith("error ")]
+    assert line.startswith("error      █▁")
+    assert len(line) <= 80
+
+
 @pytest.mark.parametrize(
     ("change", "misfits", "colour"),
     [(-0.1, [], "32"), (0.1, [], "31"), (-0.1, ["The truth is late."], "33"), (None, [], "")],
@@ -172,8 +181,8 @@ def test_a_fleet_with_mixed_labels_gets_a_manifest_to_copy(labels, clear, odd):
     drives = tomllib.loads("\n".join(lines))["drives"]
     assert [drive["path"] for drive in drives] == ["ids.mcap", "masks.mcap"]
     assert lines == [
-        *("[[drives]]", 'path = "ids.mcap"', *clear, ""),
-        *("[[drives]]", 'path = "masks.mcap"', *odd, ""),
+        *("", "[[drives]]", 'path = "ids.mcap"', *clear),
+        *("", "[[drives]]", 'path = "masks.mcap"', *odd),
     ]
     assert [*fleet.manifest(replace(facts, failed={"masks": "empty"}))] == []
 

@@ -45,6 +45,9 @@ def drive(demo, tmp_path_factory):
 def fleet(tmp_path_factory):
     """The page of a fleet whose drives have pictures."""
     folder = fleet_of(tmp_path_factory.mktemp("fleet") / "week", 24, pictures=24)
+    (next(p for p in folder.glob("results/drive_0013*") if p.is_dir()) / "report.html").write_text(
+        "the page of a drive"
+    )
     path = folder.with_name("index.html")
     run = here("report", folder, "-o", path)
     assert run.returncode == 0, run.stderr
@@ -218,6 +221,17 @@ def test_the_film_shows_the_errors_of_every_frame(tab, demo):
             picture = picture_of(tab, canvas)
             assert distance(picture, variant, number) < 6
             assert distance(picture, variant, number + 3) > 12
+
+
+def test_a_browser_that_cannot_play_the_film_shows_the_pictures_of_the_worst_frames(
+    drive, tmp_path, watched
+):
+    page = drive.read_text().replace("data:video/webm;base64,", "data:video/webm;base64,AAAA")
+    (tmp_path / "page.html").write_text(page)
+    tab = watched((tmp_path / "page.html").as_uri()).tab
+    wait_until(tab, "document.querySelector('.stage').hidden")
+    assert tab.locator(".strip:visible .pictures.main img").count() == 4
+    assert tab.locator(".play").is_hidden()
 
 
 def test_it_plays_to_the_end_of_the_chosen_part_and_stops(tab):
@@ -412,12 +426,19 @@ def test_a_fleets_page_has_every_drive_and_finds_one(fleet, watched):
     assert re.fullmatch(r"Worst frame: \w+, frame \d+ \(ERR \d+\.\d %\)", link.inner_text())
     place = seen.tab.locator(link.get_attribute("href"))
     assert place.locator("h2").inner_text() == "The worst frames over all drives"
+    drives = seen.tab.locator(".drive")
+    assert drives.count() == told["counts"]["scored"] + told["counts"]["damaged"]
+    assert drives.first.locator("img").count() == 3
+    assert drives.first.locator("a").inner_text() == "drive_0013"
+    assert seen.tab.locator(".drive a").count() == 1
     pictures = seen.tab.locator(".grid img")
     assert pictures.count() > 5
     pictures.first.scroll_into_view_if_needed()
     wait_until(seen.tab, "document.querySelector('.grid img').naturalWidth > 0")
     assert all(url.startswith((fleet.as_uri(), "data:")) for url in seen.requests)
     assert seen.complaints == []
+    drives.first.locator("a").click()
+    assert seen.tab.inner_text("body") == "the page of a drive"
 
 
 def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
@@ -477,7 +498,7 @@ def test_a_drive_has_eight_pages_at_most_and_no_frame_twice(made):
     assert len(pages) <= 8
     frames = re.findall(r"^Frame (\d+)$", "\n".join(pages), re.MULTILINE)
     assert len(set(frames)) == len(frames) > 2
-    (figure,) = (page for page in pages if "The paper's figure 2: input" in page)
+    (figure,) = (page for page in pages if "in the paper's figure 2." in page)
     assert figure.count("truth") >= 4
 
 

@@ -109,10 +109,10 @@ def test_the_folder_has_images_masks_to_correct_and_why_each(begun):
 def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(labelled):
     work, summary, done = labelled
     drawn = stamps_of(Picks.read(work / "to_label"), Why.RANDOM)
-    frames = pd.read_csv(work / "new" / "frames.csv").query("variant == 'unfiltered'")
+    frames = pd.read_csv(work / "new" / "frames.csv").query("variant == 'robust'")
     assert {*frames.stamp_ns} == drawn
     assert summary["frames"]["trained_on"] == 5
-    found = summary["estimate"]["rates"]["unfiltered"]["ERR"]
+    found = summary["estimate"]["rates"]["robust"]["ERR"]
     own = frames.query("stage == 'post'").ERR
     assert found["mean"] == pytest.approx(own.mean())
     assert found["low"] < found["mean"] < found["high"]

@@ -123,3 +123,16 @@ def test_the_first_variant_that_was_typed_is_the_focus(words, focus, capsys):
     assert main(["config", *words, *(["--preset", "paper"])]) == 0
     shown = capsys.readouterr().out
     assert (f'focus = "{focus}"' if focus else "# focus =") in shown
+
+
+def test_a_preset_without_a_filter_is_a_variant_of_its_name(drive, tmp_path):
+    """A method beside it is the focus, as it is beside `filtered`."""
+    config = settings(masks={"net": "/net/road_mask_prediction"}, train_frames=5).override(
+        {"chain": ["trees", "post"], "trees": {"trees": 2, "features": ["place"]}}
+    )
+    robust = roadeval.configure(config.as_dict() | {"preset": "robust"})
+    outcome = roadeval.replay(drive, robust, save=tmp_path / "r.rrd", reports=tmp_path / "r")
+    assert [*outcome.facts.finals] == ["robust", "net", BASELINE]
+    assert outcome.facts.focus == roadeval.Result(outcome.recording).facts.focus == "net"
+    assert outcome.summary["difference"] == outcome.summary["against_unfiltered"] == {}
+    assert [v.name for v in config.variants()] == ["unfiltered"]

@@ -17,6 +17,7 @@ from roadeval.jobs.run.prepared import prepare
 from roadeval.logs.log import open_log
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.networks import network as networks
+from roadeval.results.verdict import verdicts
 from roadeval.training.model import arrays_of
 from tests.networks.making import IMAGE, ROAD, red_network, written
 
@@ -162,10 +163,9 @@ def test_the_headline_says_what_the_training_frames_threshold_would_bring(at_tra
         "ERR": pytest.approx(then),
         "lines": found["mine"]["lines"],
     }
-    told = f"Set the threshold of mine to {threshold:.2g}, not 0.59: "
-    told += f"then {100 * then:.1f} % are wrong (write `{found['mine']['lines']}`)."
+    told = f"Set `{found['mine']['lines']}`: then {100 * then:.1f} % are wrong."
     assert now > then
-    assert told in outcome.summary["verdict"]
+    assert told in verdicts(outcome.facts)["mine"]
 
 
 def in_two_classes(path):
@@ -315,7 +315,7 @@ def test_a_model_is_refused_with_another_network(folder, tmp_path):
     ("name", "told"),
     [
         ("other", "there is no method other; choose mine"),
-        ("unfiltered", "is trained itself (trees)"),
+        ("robust", "is trained itself (trees)"),
     ],
 )
 def test_what_cannot_be_tuned(folder, name, told):

@@ -57,8 +57,8 @@ def inspect(
         roadeval inspect recordings/drive.rrd --list
         roadeval inspect recordings/drive.rrd --worst 1 --screenshot worst.png
 
-    The viewer works offline and listens on 127.0.0.1 alone. Among neighbouring frames only the
-    worst is listed. In a fleet the frames of all drives are ranked together, and the worst one
+    The viewer works offline and listens on 127.0.0.1 alone. Of each scene only the worst frame
+    is listed. In a fleet the frames of all drives are ranked together, and the worst one
     opens by default.
     """
     if frame is not None and worst is not None:
@@ -110,4 +110,4 @@ def _show(opened: Result, frame: int | None, rank: int | None, *, file: Path | N
         messages.warning(sentence)
     shown = job.view(drive, frame, file)
     if file:
-        console.emit(f"{file}: {place}frame {shown}{why}")
+        console.say(f"{file}: {place}frame {shown}{why}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
+import typer
+
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 
@@ -57,6 +59,9 @@ def report(
             "own captions.",
         ),
     ] = "drive",
+    open_report: Annotated[
+        bool, arguments.option("--open", "Open the report in the browser, or in the PDF viewer.")
+    ] = False,
     camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -81,4 +86,6 @@ def report(
         console.emit(str(path))
     for warning in opened.warnings:
         messages.warning(warning)
+    if open_report:
+        typer.launch(str(paths[-1]))
     return ExitCode.DONE

@@ -26,17 +26,19 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
     the recording of their drive was kept.
     """
     first, is_scored = frames[0], frames[0].by == TESTED
-    what, rule = "worst frames", "the worst of neighbours"
+    what, rule = "worst frames", "the worst of each scene"
     if not is_scored:
         what = "without truth, frames to look at"
         rule = "one per scene; ranked by uncertainty, not by error"
     elif of_fleet:
-        rule = "at most three per drive, a second apart"
+        rule = "at most three per drive, three seconds apart"
     out.print(f"{name}: {what} of {first.variant} by {first.by} of {first.stage} ({rule})")
     out.print()
     columns = {"": [str(frame.rank) for frame in frames]}
     if of_fleet:
-        columns["drive"] = [frame.drive for frame in frames]
+        names = {frame.drive: frame.drive.rpartition("-")[0] for frame in frames}
+        clear = len({*names.values()}) == len(names)
+        columns["drive"] = [names[frame.drive] if clear else frame.drive for frame in frames]
     elif any(frame.camera for frame in frames):
         names = short_names([*dict.fromkeys(frame.camera for frame in frames)])
         columns["camera"] = [names[frame.camera] for frame in frames]
@@ -61,9 +63,8 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
 def _why(frame: WorstFrame) -> str:
     """Return which errors a frame has, and the notes on it; on the filter only of what has it."""
     notes = frame.notes if frame.variant == FILTERED else without_filter(frame.notes)
-    # The title names the variant.
-    clauses = [
-        f"{describe_errors(frame.rates)}.",
-        *(n.removeprefix(f"{frame.variant} ") for n in notes),
-    ]
+    # The title names the variant, and the first sentence says what it misses.
+    about = [note.removeprefix(f"{frame.variant} ") for note in notes]
+    about = [note for note in about if not note.startswith(("finds ", "gets "))]
+    clauses = [f"{describe_errors(frame.rates)}.", *about]
     return " ".join(clause[:1].upper() + clause[1:] for clause in clauses)

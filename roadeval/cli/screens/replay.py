@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import counted
+from roadeval.data.words import counted, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
@@ -22,6 +22,8 @@ from roadeval.report.tables import cameras_table, differences_table, stages_tabl
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction
 from roadeval.results.verdict import ROBUST, without_truth
+
+BARS: Final = "▁▂▃▄▅▆▇█"
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,7 +75,10 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:
-    """Print the paths of the outputs on one line each, to copy, and what to type next."""
+    """Print the error along the drive, the outputs' paths to copy, and what to type next."""
+    if outcome.errors and out.encoding.startswith("utf"):
+        label = f" up to {percent(max(outcome.errors), 1)} % ({outcome.facts.focus})"
+        out.print(f"error      {_sparkline(outcome.errors, out.width - 11 - len(label))}{label}")
     if outcome.recording:
         size = megabytes(outcome.recording)
         out.print(f"recording  {outcome.recording} ({size})", soft_wrap=True)
@@ -81,9 +86,17 @@ def _show_files(outcome: Outcome, out: Console) -> None:
         count = len(outcome.files)
         out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
     if figures := [str(file) for file in outcome.files if file.suffix == ".png"]:
-        out.print(f"figures    {' '.join(figures)}", soft_wrap=True)
+        line = f"figures    {' '.join(figures)}"
+        out.print(console.wrap(line, out.width, indent=0, hang=11), soft_wrap=True)
     if place := outcome.recording or outcome.reports:
         console.show_next(out, *islice(_next_commands(outcome, place), 3))
+
+
+def _sparkline(errors: Sequence[float], room: int) -> str:
+    """Draw error rates as bars beside each other; those that share a bar as the highest."""
+    size = -(-len(errors) // max(room, 1))
+    bars = [max(errors[begin : begin + size]) for begin in range(0, len(errors), size)]
+    return "".join(BARS[int(bar / (max(bars) or 1) * (len(BARS) - 1))] for bar in bars)
 
 
 def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:

@@ -52,7 +52,7 @@ class WorstFrame:
 
 
 def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
-    """Rank the worst frames by ERR of the focus's mask; of neighbours only the worst counts.
+    """Rank the worst frames by ERR of the focus's mask; of each scene only the worst counts.
 
     If nothing was scored, frames are ranked by how much the mask is in doubt, one a scene. In a
     fleet the frames of all drives are ranked together, all that are known by default. A
@@ -100,7 +100,7 @@ def _ranked(
     by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
         return []
-    apart = None if by == TESTED else tables.scene_ns(rows["stamp_ns"])
+    apart = tables.scene_ns(rows["stamp_ns"])
     looked_at = masks if among is None else masks[masks["frame"].isin([*among])]
     ranked = tables.worst(looked_at, count, by, apart).to_dict("records")
     parts: dict[Any, Any] = {}
@@ -158,7 +158,7 @@ def of_rank(result: Result, rank: int) -> WorstFrame:
         (path,) = result.paths
         raise RoadevalError(
             f"{path}: there is no worst frame number {rank}: {len(frames)} are ranked, of "
-            "neighbouring frames the worst alone"
+            "each scene the worst alone"
         )
     return frames[-1]
 

@@ -67,7 +67,7 @@ def write_report(
     with holding(path, inputs=[source]):
         if path.suffix.lower() not in PAGES:
             return write_file(path, typeset(document(findings_of(opened))))
-        return write_page(path, page_of(opened, on_progress))
+        return write_page(path, page_of(opened, on_progress, path.parent))
 
 
 WIDTHS: Final = (4, 100)
@@ -157,11 +157,11 @@ def findings_of(result: Result) -> Findings | FleetFolder:
     return collect(result.drive)
 
 
-def page_of(result: Result, on_progress: OnProgress = ignore) -> Report:
-    """Return the page of a result as a document, with its most telling frames."""
+def page_of(result: Result, on_progress: OnProgress = ignore, folder: Path = Path()) -> Report:
+    """Return the page of a result, for a folder, as a document with its most telling frames."""
     findings = findings_of(result)
     if result.drive is None:
-        return page_document(findings, None, PICTURED_OF_FLEET)
+        return page_document(findings, None, PICTURED_OF_FLEET, folder)
     frames = browsed(result.drive)
     room = BYTES - len(page(page_document(findings, frames)))
     film = film_of(result.drive, min(room // 2, FILM_BYTES * len(frames.rows)), on_progress)

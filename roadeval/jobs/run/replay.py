@@ -10,8 +10,9 @@ from typing import Any, Final
 from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import FrameResult, Role
 from roadeval.data.words import short_names
+from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import DriveSums
-from roadeval.evaluation.tables import concatenate
+from roadeval.evaluation.tables import concatenate, finals, only
 from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -48,6 +49,8 @@ class Outcome:
     """Where in their code stages failed that are among the losses."""
     metres: tuple[Mapping[str, Any], ...] = ()
     """The rows of ``metres``; empty of a rig, and of a camera that is not known."""
+    errors: tuple[float, ...] = ()
+    """ERR of the focus frame by frame; empty of a rig."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -138,12 +141,14 @@ def _replay_log(
                     windows, shown = end.sums.windows, drawn[camera]
                     write_figures(results.folder, log.name, windows, shown, names[camera])
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
+    of_focus = finals(only(ended[0].sums.frames, variant=facts.focus or ""))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
     return Outcome(
         *(to.recording, to.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
         tuple(files),
         tracebacks=tracebacks,
         metres=ended[0].metres if len(ended) == 1 else (),
+        errors=tuple(of_focus[TESTED].dropna()) if len(ended) == 1 else (),
     )
 
 

@@ -47,14 +47,12 @@ def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
         blocks.append(Table(["claim", "true in"], rows, caption=legend))
     if findings.examples:
         blocks.append(example_grid(findings.examples, caption("figure 2")))
-    if len(findings.windows):
-        points = describe_points(findings.windows)
-        blocks.append(Text(f"Below, {points}.", "note"))
-    blocks += [
-        Figure(charts, figure.caption)
-        for figure in figures_over_drive()
-        if (charts := figure.charts(findings.windows))
-    ]
+    about = describe_points(findings.windows) if len(findings.windows) else ""
+    points = f" Here and below {about}."
+    for figure in figures_over_drive():
+        if drawn := figure.charts(findings.windows):
+            blocks.append(Figure(drawn, f"{figure.caption}{points}"))
+            points = ""
     if blocks and heading:
         yield Heading("Over the drive")
     if blocks:

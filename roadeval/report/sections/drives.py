@@ -5,18 +5,34 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from os.path import relpath
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
+from urllib.parse import quote
+
+import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, first_of, number, percent, points
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import BASES, Effect
-from roadeval.evaluation.tables import only, values_of
-from roadeval.report.blocks import Block, Cell, Details, Heading, ImageFile, ImageGrid, Table, Text
+from roadeval.evaluation.tables import finals, group_rows, only, values_of
+from roadeval.report.blocks import (
+    Block,
+    Cell,
+    Details,
+    DriveRow,
+    Heading,
+    ImageFile,
+    ImageGrid,
+    Table,
+    Text,
+)
 from roadeval.report.captions import caption, note
+from roadeval.report.chart import Chart, ChartKind, Series, looks, thin
 from roadeval.report.charts.standard import forest
 from roadeval.results.facts import StratumFacts
-from roadeval.results.fleet import FleetFolder
+from roadeval.results.fleet import FleetFolder, results_path
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, marked_interval
@@ -48,7 +64,7 @@ def plots(findings: FleetFolder) -> Iterator[Block]:
         plot = [forest(rows, effect.rates[TESTED], label)] if len(rows) else []
         yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
     blocks = [drives_table(findings, NAMED), note("units")]
-    yield Details("Drives with the highest error rate", blocks)
+    yield Details(f"Drives with the highest error rate of {findings.facts.focus}", blocks)
 
 
 def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
@@ -83,6 +99,56 @@ def table(findings: FleetFolder) -> Iterator[Block]:
     yield note("sorted drives", variant=findings.facts.focus)
 
 
+ROW_PICTURES: Final = 3
+"""Worst frames beside the error rate of a drive."""
+ROW_POINTS: Final = 120
+PAGE: Final = "report.html"
+"""The name of a drive's page in the folder of its results."""
+
+
+def along(findings: FleetFolder, most: int, beside: Path) -> Iterator[Block]:
+    """Yield the error rate of the focus along each drive, the worst drive first.
+
+    The first drives have pictures of their worst frames, ``most`` in all. A drive's page is linked
+    from a page in the folder ``beside``.
+    """
+    focus, scores = findings.facts.focus, findings.focus_scores
+    if focus is None or scores.empty:
+        return
+    rates = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
+    frames = finals(only(findings.table("frames"), variant=focus))
+    top, look = 100 * max(frames[TESTED].max(), 0.01), looks([*findings.finals])[focus]
+    yield Heading(f"Along each drive: {focus}")
+    yield note("along drives", variant=focus)
+    rows = {drive: part for (drive,), part in group_rows(frames, ["drive"])}
+    pictured = findings.pictured.sort_values(TESTED, ascending=False, kind="stable")
+    shown_frames = {drive: part for (drive,), part in group_rows(pictured, ["drive"])}
+    for drive, rate in rates.items():
+        part = rows[drive]
+        position = np.linspace(0, 100, len(part)).tolist() if len(part) > 1 else [0.0]
+        line = Series(focus, look, position, (100 * part[TESTED]).tolist())
+        pictures = []
+        for row in records(shown_frames.get(drive, frames[:0])[: min(ROW_PICTURES, most)]):
+            if content := findings.picture(row):
+                title = f"frame {row['frame']}: {percent(row[TESTED], 1)} %"
+                pictures.append((title, ImageFile(content)))
+        most -= len(pictures)
+        page = results_path(findings.path, str(drive)) / PAGE
+        yield DriveRow(
+            findings.names[str(drive)],
+            f"ERR {percent(rate)} %",
+            Chart(
+                *("ERR", ChartKind.LINES, [thin(line, ROW_POINTS)]),
+                across="part of the drive",
+                x_range=(0.0, 100.0),
+                y_range=(0.0, top),
+                low=True,
+            ),
+            quote(relpath(page, beside)) if page.is_file() else "",
+            pictures,
+        )
+
+
 def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     """Tabulate every drive with its state, its rates and its tags.
 
@@ -113,9 +179,9 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
             for base, changes in _differences(findings).items()
         },
     }
-    if worst is not None:
-        unused = ["state", "group", *([] if any(tags.values()) else ["tags"])]
-        columns = {title: cells for title, cells in columns.items() if title not in unused}
+    unused = [title for title in ("group", "tags") if not any(columns[title])]
+    unused += [] if worst is None else ["state", "group"]
+    columns = {title: cells for title, cells in columns.items() if title not in unused}
     return Table(
         [*columns],
         [*zip(*columns.values(), strict=True)],
@@ -250,6 +316,6 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
             ]
             for row in rows
         ],
-        text_columns=(0, 1, 4),
+        text_columns=(0, 1, 2, 3, 4),
         small=True,
     )

@@ -10,6 +10,7 @@ import pytest
 
 from roadeval.data import ERRORS
 from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.evaluation.tables import windows
 from roadeval.report.blocks import (
     Cell,
     Command,
@@ -27,7 +28,7 @@ from roadeval.report.charts import standard as charts
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections.drive import filter_effect, regions, thresholds
+from roadeval.report.sections.drive import filter_effect, over_drive, regions, thresholds
 from roadeval.report.sections.frames import FrameBrowser, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
 from roadeval.report.sections.summary import warnings
@@ -275,3 +276,20 @@ def test_bold_is_the_best_and_nothing_else():
     tables = stages_table(facts.totals), differences_table(facts)
     cells = [cell for table in tables for row in table.rows for cell in row]
     assert [cell for cell in cells if isinstance(cell, Cell) and cell.bold] == []
+
+
+@pytest.mark.parametrize(
+    ("claims", "title"),
+    [
+        ({"filter_ERR": {"held": 1, "windows": 2}}, "The paper's claims, and its figures"),
+        ({}, "Masks and rates along the drive"),
+    ],
+)
+def test_figures_are_the_paper_s_if_its_pipeline_ran_and_a_short_last_point_is_said(claims, title):
+    table = a_table({("net", "post"): [10] * 14}).assign(drive="street", camera="")
+    tables = {"frames": table, "windows": windows(table, 10)}
+    _, details = over_drive(some_findings(claims=claims, table=tables.get))
+    assert details.title.startswith(title)
+    first, *others = (block for block in details.blocks if isinstance(block, Figure))
+    assert "each point is the mean of 10 frames, the last of 4." in first.caption
+    assert not any("point" in figure.caption for figure in others)
