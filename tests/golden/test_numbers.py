@@ -246,7 +246,7 @@ def test_the_report_s_differences(run, told, lines):
     wrong = (rows.FP + rows.FN).groupby(rows.variant).sum()
     net = wrong.filtered - wrong.unfiltered
     word = "more" if net > 0 else "fewer"
-    assert f"that leaves {abs(net):,} {word} wrong pixels in all." in text
+    assert f"were right: {abs(net):,} {word} wrong pixels in all." in text
 
 
 REGIONS: Final = {
@@ -333,7 +333,8 @@ def test_figure_2_shows_the_frames_that_the_report_shows(told, lines):
     assert len(drawn) == 4
     assert [int(each) for each in drawn] == told.summary()["examples"]
     text = "\n".join(lines["paper"])
-    figures = text[text.index("2 Over the drive") : text.index("The paper's figure 2")]
+    begin, end = (text.index(words) for words in ("the paper's figure 2", "the paper's figure 3a"))
+    figures = text[begin:end]
     assert re.findall(r"frame (\d+)", figures) == drawn
 
 
