@@ -62,8 +62,8 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     fleet = FleetFolder(outcome.folder)
     failed = fleet.drives.loc[[*outcome.problems]]
     for reason, drives in by_reason(fleet, failed).items():
-        told = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
-        yield f"{first_of(drives, NAMED)}: {told}"
+        sentence = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
+        yield f"{first_of(drives, NAMED)}: {sentence}"
 
 
 def manifest(facts: FleetFacts) -> Iterator[str]:
@@ -75,7 +75,6 @@ def manifest(facts: FleetFacts) -> Iterator[str]:
     named = {key: value for key, value in facts.run["labels"].items() if value}
     labels = ", ".join(f"{key} = {json.dumps(value)}" for key, value in named.items())
     for drive in facts.drives[:NAMED] if odd and len(facts.drives) > 1 else ():
-        yield from ("[[drives]]", f"path = {json.dumps(drive.source)}")
+        yield from ("", "[[drives]]", f"path = {json.dumps(drive.source)}")
         if bool(labels) != (drive.drive in odd):
             yield f"labels = {{ {labels or 'road = [1]'} }}"
-        yield ""

@@ -51,7 +51,7 @@ def show_verdict(facts: Facts | FleetFacts, out: Console) -> None:
     if isinstance(facts, Facts) and facts.misfits:
         style = "bold yellow"
     out.print()
-    out.print(with_flags(facts.verdict), style=style)
+    out.print(ascii_of(with_flags(facts.verdict)), style=style)
 
 
 def show_table(table: Table, out: Console) -> None:
