@@ -14,7 +14,7 @@ import typer
 
 from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.help import WIDEST, Command, Program
+from roadeval.cli.help import WIDEST, GroupedCommand, Program
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
 from roadeval.runtime.sentence import Sentence
@@ -42,7 +42,7 @@ _others = sorted({module.name for module in iter_modules(commands.__path__)} - {
 for _name in (*FIRST, *_others):
     # A command is the function that has the name of its file.
     _module = import_module(f"{commands.__name__}.{_name}")
-    app.command(cls=Command)(getattr(_module, _name))
+    app.command(cls=GroupedCommand)(getattr(_module, _name))
 
 
 def _show_version(show: bool) -> None:

@@ -120,6 +120,17 @@ def wrap(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
     return Text(lines)
 
 
+def break_lines(sentence: str, out: Console) -> Text:
+    """Break a sentence between words at a terminal, and nowhere in a file."""
+    return wrap(sentence, out.width if out.is_terminal else sys.maxsize, 0, hang=4)
+
+
+def say(sentence: str, out: Console | None = None) -> None:
+    """Print a sentence, by default on stdout, which breaks between words at a terminal."""
+    out = out or results()
+    out.print(break_lines(sentence, out), soft_wrap=True)
+
+
 @contextmanager
 def _output_errors() -> Iterator[None]:
     """Turn an OSError inside the block into an `OutputError`; a broken pipe stays one."""

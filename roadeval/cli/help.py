@@ -50,7 +50,7 @@ class Program(TyperGroup):
         formatter.write_text(EXIT_CODES)
 
 
-class Command(TyperCommand):
+class GroupedCommand(TyperCommand):
     """A command, whose docstring has a line, indented examples, and explanations."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:

@@ -72,11 +72,8 @@ def _write(kind: str, style: str, sentence: str) -> None:
     """Write a line that names settings by their flags."""
     text = visible(without_secrets(with_flags(sentence)))
     try:
-        from rich.text import Text
-
-        line, stderr = f"{PROGRAM}: {kind}: {text}", console.diagnostics()
-        # A file has a line for each message; a terminal would break a long one inside a word.
-        shown = console.wrap(line, stderr.width, 0, 4) if stderr.is_terminal else Text(line)
+        stderr = console.diagnostics()
+        shown = console.break_lines(f"{PROGRAM}: {kind}: {text}", stderr)
         begin = len(PROGRAM) + 2
         shown.stylize(style, begin, begin + len(kind) + 1)
         stderr.print(shown, soft_wrap=True)

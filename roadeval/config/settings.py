@@ -28,8 +28,8 @@ class OutputSettings:
         also records labels and the camera's image. ``worst:K`` records all pictures of the K frames
         with the highest ERR, in a log without truth with the most uncertain masks; ``every:N``
         those of every N-th frame. ``none`` makes no recording.
-    focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the
-        first that you bring, else ``filtered``.
+    focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
+        that you bring, else ``filtered``.
     figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
     """
 

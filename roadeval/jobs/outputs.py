@@ -81,7 +81,9 @@ def holding(
     for number, path in enumerate(outputs):
         earlier = places[:number] if path is folder else {*places[:number], *taken}
         if places[number] in earlier:
-            raise RoadevalError(f"{path}: is an input or another output; name a file of its own")
+            raise RoadevalError(
+                "is an input or another output", where=path, remedy="name a file of its own"
+            )
     with ExitStack() as claims:
         certain = [_claim(claims, path, claim_file(path)) for path in paths]
         if folder:
@@ -103,7 +105,7 @@ def _claim(claims: ExitStack, path: Path, claim: AbstractContextManager[bool]) -
         return claims.enter_context(claim)
     except BlockingIOError as error:
         raise RoadevalError(
-            f"{path}: {error.strerror}; wait until it has ended, or write elsewhere"
+            str(error.strerror), where=path, remedy="wait until it has ended, or write elsewhere"
         ) from error
     except OSError as error:
-        raise RoadevalError(f"{path}: cannot be written: {error.strerror}") from error
+        raise RoadevalError(f"cannot be written: {error.strerror}", where=path) from error

@@ -92,7 +92,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     damage = [Damage(file, 0, problem) for file, problem in problems.items()]
     files = [file for file in there if file not in problems]
     if not files:
-        raise LogError(f"{path}: {damage[0]}" if damage else _describe_folder(path))
+        raise LogError(str(damage[0]) if damage else _describe_folder(path), where=path)
     expected = {*_missing_numbers(there), *_files_in_metadata(path, {*there})}
     lacking = sorted(expected - {*there}, key=natural)
     unnamed = "the file is not called *.mcap"
@@ -177,8 +177,8 @@ def _describe_folder(path: Path) -> str:
     for file in sorted(filter(Path.is_file, path.iterdir()), key=natural):
         with suppress(OSError), file.open("rb") as opened:
             if (head := opened.read(_HEAD)) and (other := _other_kind(file, head)):
-                return f"{path}: no *.mcap file in it; {visible(file.name)} is {other}"
-    return f"{path}: a folder without *.mcap files"
+                return f"no *.mcap file in it; {visible(file.name)} is {other}"
+    return "a folder without *.mcap files"
 
 
 def is_shown(file: Path) -> bool:

@@ -301,24 +301,23 @@ def _read_index(file: IO[bytes]) -> Stores | None:
         return None
     file.seek(offset)
     index = memoryview(file.read(min(length, end)))
-    parts = [dict(protobuf_fields(part)) for _, part in protobuf_fields(index)]
-    return [(part[_STORE], _listed_messages(part[_INDEX])) for part in parts]
-
-
-def _listed_messages(index: memoryview) -> list[StoredMessage]:
-    """Return the messages of a store that its part of the index lists."""
-    fields = dict(protobuf_fields(index))
-    content, compression, size = (
-        fields[number] for number in (_LISTED_CONTENT, _LISTED_COMPRESSION, _LISTED_SIZE)
-    )
-    batch = _decompress(content, compression, size)
-    names = [f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size", "is_static")]
-    names += [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
-    columns = (batch.column(name).to_pylist() for name in names)
-    return [
-        StoredMessage(path, offset, size, ALWAYS if static else _span(frames))
-        for path, offset, size, static, *frames in zip(*columns, strict=True)
-    ]
+    chunk = [f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size", "is_static")]
+    stores = []
+    for _, part in protobuf_fields(index):
+        store = dict(protobuf_fields(part))
+        listed = dict(protobuf_fields(store[_INDEX]))
+        content, *packing = (
+            listed[number] for number in (_LISTED_CONTENT, _LISTED_COMPRESSION, _LISTED_SIZE)
+        )
+        batch = _decompress(content, *packing)
+        ends = [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
+        columns = (batch.column(name).to_pylist() for name in (*chunk, *ends))
+        messages = [
+            StoredMessage(path, offset, size, ALWAYS if static else _span(frames))
+            for path, offset, size, static, *frames in zip(*columns, strict=True)
+        ]
+        stores.append((store[_STORE], messages))
+    return stores
 
 
 def _span(frames: Sequence[int | None]) -> FrameSpan | None:

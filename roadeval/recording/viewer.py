@@ -109,7 +109,12 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
     deadline = time.monotonic() + LOADING_S
     while time.monotonic() < deadline:
         if process.poll() is not None:
-            raise RecordingError(f"the viewer did not start: {_reason(log)}")
+            os.lseek(log, 0, os.SEEK_SET)
+            lines = os.read(log, 1 << 20).decode(errors="replace").split("\n")
+            last = next(
+                (line.strip() for line in reversed(lines) if line.strip()), "it printed nothing"
+            )
+            raise RecordingError(f"the viewer did not start: {last}")
         try:
             client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
             state = client.get_state()
@@ -167,10 +172,3 @@ def _driver() -> dict[str, str]:
             f"apt-get install {PACKAGE}"
         )
     return {"VK_ICD_FILENAMES": str(drivers[0])}
-
-
-def _reason(log: int) -> str:
-    """Return the last line that the viewer printed."""
-    os.lseek(log, 0, os.SEEK_SET)
-    lines = os.read(log, 1 << 20).decode(errors="replace").split("\n")
-    return next((line.strip() for line in reversed(lines) if line.strip()), "it printed nothing")

@@ -9,6 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
+from roadeval.data import FILTERED, UNFILTERED
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
@@ -96,7 +97,8 @@ def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
             yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
         if facts.drive.rate_hz:
             yield f"{facts.drive.rate_hz:.4g} Hz"
-    if preset:
+    variants = getattr(findings.facts, "settings", findings.facts.finals)
+    if preset and {FILTERED, UNFILTERED, preset} & {*variants}:  # else it has not run
         yield f"preset {preset}"
     if version:
         yield f"roadeval {version}"

@@ -30,6 +30,8 @@ NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
 """Independent frames below which those of one drive say little about other frames."""
+WORDS: Final = 60
+"""Words of a verdict; a longer one does not explain the baseline."""
 WEAK: Final = 0.02
 """An error rate from which the preset ``robust`` is worth a try."""
 ROBUST: Final = "robust"
@@ -119,16 +121,18 @@ def verdict(
     own = rates[focus][TESTED]
     whole_drive = [*from_labels(estimated, focus)]
     lead = "On these alone: " if whole_drive else ""
-    other = f"Best here is {best}: {percent(rates[best][TESTED], 1)} %."
-    return " ".join(
+    least = percent(rates[best][TESTED], 1)
+    is_other = not defined(own) or (rates[best][TESTED] < own and least != percent(own, 1))
+    text = " ".join(
         [
             *whole_drive,
             f"{lead}{_how_wrong(focus, rates[focus], [*of_focus.values()])}",
             *_compared(focus, of_focus),
-            *([other] if not defined(own) or rates[best][TESTED] < own else []),
+            *([f"Best here is {best}: {least} %."] if is_other else []),
             *_next_step(focus, rates, thresholds or {}),
         ]
     )
+    return text if len(text.split()) <= WORDS else text.replace(BLIND, BASELINE)
 
 
 def _how_wrong(name: str, rates: Rates, differences: Sequence[Difference]) -> str:
@@ -259,18 +263,15 @@ def _next_step(
 ) -> Iterator[str]:
     """Yield what to do next: set the threshold, or try the preset that is best on real roads.
 
-    A threshold is not told if the error rate would hardly change.
+    A threshold is not told if fewer pixels are hardly wrong at it.
     """
     own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
     best = thresholds.get(focus)
-    if best and defined(pooled) and abs(pooled - best[TESTED]) >= ROUNDING:
-        digits = 1 if abs(pooled - best[TESTED]) >= FINE else 2
-        lines = "` and `".join(best.get("lines", "").splitlines())
-        yield (
-            f"Set its threshold to {best['threshold']:.2g}, not {best['own']:.2g}: then "
-            f"{in_percent(best[TESTED]):.{digits}f} % are wrong"
-            f"{f' (write `{lines}`)' if lines else ''}."
-        )
+    if best and defined(pooled) and pooled - best[TESTED] >= ROUNDING:
+        digits = 1 if pooled - best[TESTED] >= FINE else 2
+        lines = best.get("lines") or f"threshold = {best['threshold']:.2g}"
+        setting = "`, `".join(lines.splitlines())
+        yield f"Set `{setting}`: then {in_percent(best[TESTED]):.{digits}f} % are wrong."
     elif focus in (FILTERED, UNFILTERED) and ROBUST not in rates and defined(own) and own >= WEAK:
         yield "Next: try --variant robust."
 

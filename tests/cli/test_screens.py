@@ -181,8 +181,8 @@ def test_a_fleet_with_mixed_labels_gets_a_manifest_to_copy(labels, clear, odd):
     drives = tomllib.loads("\n".join(lines))["drives"]
     assert [drive["path"] for drive in drives] == ["ids.mcap", "masks.mcap"]
     assert lines == [
-        *("[[drives]]", 'path = "ids.mcap"', *clear, ""),
-        *("[[drives]]", 'path = "masks.mcap"', *odd, ""),
+        *("", "[[drives]]", 'path = "ids.mcap"', *clear),
+        *("", "[[drives]]", 'path = "masks.mcap"', *odd),
     ]
     assert [*fleet.manifest(replace(facts, failed={"masks": "empty"}))] == []
 

@@ -219,9 +219,15 @@ def test_a_table_of_thousands_of_variants_is_refused(results):
     assert "column variant holds 2,000 different words" in refused("report", results)
 
 
+@pytest.fixture(scope="module")
+def week(tmp_path_factory):
+    return fleet_of(tmp_path_factory.mktemp("week") / "week", 2)
+
+
 @pytest.fixture
-def fleet(tmp_path):
-    return fleet_of(tmp_path / "week", 4)
+def fleet(week, tmp_path):
+    """A fleet, to be changed."""
+    return shutil.copytree(week, tmp_path / "week")
 
 
 @pytest.mark.parametrize(

@@ -223,6 +223,17 @@ def test_the_film_shows_the_errors_of_every_frame(tab, demo):
             assert distance(picture, variant, number + 3) > 12
 
 
+def test_a_browser_that_cannot_play_the_film_shows_the_pictures_of_the_worst_frames(
+    drive, tmp_path, watched
+):
+    page = drive.read_text().replace("data:video/webm;base64,", "data:video/webm;base64,AAAA")
+    (tmp_path / "page.html").write_text(page)
+    tab = watched((tmp_path / "page.html").as_uri()).tab
+    wait_until(tab, "document.querySelector('.stage').hidden")
+    assert tab.locator(".strip:visible .pictures.main img").count() == 4
+    assert tab.locator(".play").is_hidden()
+
+
 def test_it_plays_to_the_end_of_the_chosen_part_and_stops(tab):
     drag(tab, tab.locator(".ribbons .area").first, 0.3, 0.45)
     while tab.locator(".previous").is_enabled():

@@ -30,7 +30,7 @@ RULES: Final[Mapping[str, tuple[str, str | Callable[[re.Match[str]], str]]]] = {
     "progress, the pace": (r", \d+\.\d frames/s(, \d+ s left)?", ""),
     # These belong to no machine, but would hide from the eye what is bold.
     "bold that goes on": (r"\x1b\[0m( *)\x1b\[1m(?=.)", r"\1"),
-    "bold": (r"\x1b\[[01]m", "**"),
+    "bold": (r"\x1b\[(?:0|1(?:;3\d)?)m", "**"),
     # The leaders of a table of contents: as many dots as a line has room for.
     "leaders": (r"(?: \.){4,}", " ..."),
     "spaces at a line's end": (r"(?m)[ \t]+$", ""),

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,10 @@ import pytest
 import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.run import prepared
-from tests.e2e.test_fleet import Here, run, tables, write
+from tests.e2e import test_fleet
+from tests.e2e.test_fleet import Here, tables, write
+
+run = partial(test_fleet.run, only=["unfiltered"])
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,9 @@ def folder(tmp_path_factory):
 
 
 def with_network(path, **values):
-    return settings(**values).with_variants([network_variant("mine", str(path))])
+    """A network as a variant beside one that learns."""
+    config = settings(**values).with_variants([network_variant("mine", str(path))])
+    return config.override({"only": ["unfiltered", "mine"]})
 
 
 def alone(path, **values):

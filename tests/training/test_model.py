@@ -217,8 +217,9 @@ def refusal(arrays, folder: Path) -> str:
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
-    for name, array in arrays.items():
-        field = name.rpartition("/")[-1]
+    one_of_each_stage = {name.partition("/")[2] or name: name for name in arrays}
+    for name in one_of_each_stage.values():
+        array, field = arrays[name], name.rpartition("/")[-1]
         if field == "header" or (damage, field) in HARMLESS:
             continue
         spoilt = DAMAGES[damage](array)

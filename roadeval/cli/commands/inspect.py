@@ -110,4 +110,4 @@ def _show(opened: Result, frame: int | None, rank: int | None, *, file: Path | N
         messages.warning(sentence)
     shown = job.view(drive, frame, file)
     if file:
-        console.emit(f"{file}: {place}frame {shown}{why}")
+        console.say(f"{file}: {place}frame {shown}{why}")

@@ -40,5 +40,5 @@ def pack(
         messages.warning(warning)
     if not quiet:
         masks = f", {packed.labelled} with a mask" if truth else ""
-        console.emit(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
+        console.say(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
     return ExitCode.DONE

@@ -76,7 +76,7 @@ def pick(
         uncertain = f", {ranked} most in doubt (by {by})" if ranked else ""
         drawn = f"{random} drawn at random of {len(drive.picks.stamps):,}"
         added = counted(len(drive.added), "frame")
-        console.emit(f"{drive.folder}: {added} to label: {drawn}{uncertain}")
+        console.say(f"{drive.folder}: {added} to label: {drawn}{uncertain}")
     if drives and not quiet:
         out = console.results()
         out.print(f"Correct {drives[0].folder}/proposals, and put the results into labels/.")

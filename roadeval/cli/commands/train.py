@@ -49,7 +49,7 @@ def train(
     for warning in model.warnings:
         messages.warning(warning)
     if not quiet:
-        console.emit(
+        console.say(
             f"{output}: {', '.join(model.parameters)}; trained on {len(model.digests)} frames, "
             f"{model.pixels} pixels, by the {model.source}"
         )

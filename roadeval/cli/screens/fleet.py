@@ -18,7 +18,6 @@ from roadeval.report.sections.drives import by_reason, drives_table
 from roadeval.report.sections.summary import drives_account
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.verdict import focus_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -47,7 +46,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show(
-            [*blocks, Heading(f"Drives with the highest ERR of {focus_of(facts.finals)}"), worst],
+            [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],
             out,
         )
         out.print()
@@ -63,8 +62,8 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     fleet = FleetFolder(outcome.folder)
     failed = fleet.drives.loc[[*outcome.problems]]
     for reason, drives in by_reason(fleet, failed).items():
-        told = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
-        yield f"{first_of(drives, NAMED)}: {told}"
+        sentence = re.sub(r"`([\w.]+)`", lambda setting: FLAGS.get(setting[1], setting[0]), reason)
+        yield f"{first_of(drives, NAMED)}: {sentence}"
 
 
 def manifest(facts: FleetFacts) -> Iterator[str]:
@@ -76,7 +75,6 @@ def manifest(facts: FleetFacts) -> Iterator[str]:
     named = {key: value for key, value in facts.run["labels"].items() if value}
     labels = ", ".join(f"{key} = {json.dumps(value)}" for key, value in named.items())
     for drive in facts.drives[:NAMED] if odd and len(facts.drives) > 1 else ():
-        yield from ("[[drives]]", f"path = {json.dumps(drive.source)}")
+        yield from ("", "[[drives]]", f"path = {json.dumps(drive.source)}")
         if bool(labels) != (drive.drive in odd):
             yield f"labels = {{ {labels or 'road = [1]'} }}"
-        yield ""

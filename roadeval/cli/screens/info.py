@@ -25,19 +25,19 @@ def show(log: LogDescription, out: Console) -> None:
     size = f"{log.bytes / 1e6:.1f} MB"
     unverified = "" if log.verified else "; not read whole, --verify looks for all damage"
     length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
-    out.print(f"{log.path}: {length}, {size}{unverified}", soft_wrap=True)
+    console.say(f"{log.path}: {length}, {size}{unverified}", out)
     out.print()
     tables.show_table(_topic_table(log.topics), out)
     for topic in log.topics:
         if topic.problem:
-            out.print(f"{topic.name} cannot be read: {with_flags(topic.problem)}", soft_wrap=True)
+            console.say(f"{topic.name} cannot be read: {with_flags(topic.problem)}", out)
         for before, after in topic.gaps:
             gap = f"gap of {(after - before) / NS:.2f} s"
             since = f"{(before - log.start_ns) / NS:.2f} s after the start"
-            out.print(f"{topic.name}: {gap}, {since}", soft_wrap=True)
+            console.say(f"{topic.name}: {gap}, {since}", out)
     out.print()
     if log.problem:
-        out.print(f"replay would stop: {with_flags(log.problem)}", soft_wrap=True)
+        console.say(f"replay would stop: {with_flags(log.problem)}", out)
         return
     for misfit in log.misfits:
         out.print(console.wrap(with_flags(misfit), out.width, 0), soft_wrap=True)

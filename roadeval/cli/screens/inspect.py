@@ -63,9 +63,8 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
 def _why(frame: WorstFrame) -> str:
     """Return which errors a frame has, and the notes on it; on the filter only of what has it."""
     notes = frame.notes if frame.variant == FILTERED else without_filter(frame.notes)
-    # The title names the variant.
-    clauses = [
-        f"{describe_errors(frame.rates)}.",
-        *(n.removeprefix(f"{frame.variant} ") for n in notes),
-    ]
+    # The title names the variant, and the first sentence says what it misses.
+    about = [note.removeprefix(f"{frame.variant} ") for note in notes]
+    about = [note for note in about if not note.startswith(("finds ", "gets "))]
+    clauses = [f"{describe_errors(frame.rates)}.", *about]
     return " ".join(clause[:1].upper() + clause[1:] for clause in clauses)

@@ -21,7 +21,7 @@ from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction
-from roadeval.results.verdict import ROBUST, focus_of, without_truth
+from roadeval.results.verdict import ROBUST, without_truth
 
 BARS: Final = "▁▂▃▄▅▆▇█"
 
@@ -77,7 +77,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
 def _show_files(outcome: Outcome, out: Console) -> None:
     """Print the error along the drive, the outputs' paths to copy, and what to type next."""
     if outcome.errors and out.encoding.startswith("utf"):
-        label = f" up to {percent(max(outcome.errors), 1)} % ({focus_of(outcome.facts.finals)})"
+        label = f" up to {percent(max(outcome.errors), 1)} % ({outcome.facts.focus})"
         out.print(f"error      {_sparkline(outcome.errors, out.width - 11 - len(label))}{label}")
     if outcome.recording:
         size = megabytes(outcome.recording)

@@ -10,7 +10,6 @@ from roadeval.data import BASELINE, words
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, BulletList, Cell, Heading, Table, Text, plain
 from roadeval.results.facts import Facts, FleetFacts
-from roadeval.results.verdict import focus_of
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -45,14 +44,14 @@ def show_verdict(facts: Facts | FleetFacts, out: Console) -> None:
 
     It is yellow if truth, masks and images do not fit.
     """
-    focus, style = focus_of(facts.finals), "bold"
+    focus, style = facts.focus, "bold"
     for effect in facts.final_effects:
         if (effect.base, effect.variant) == (BASELINE, focus) and effect.rates[TESTED].units:
             style = "bold green" if effect.rates[TESTED].mean < 0 else "bold red"
     if isinstance(facts, Facts) and facts.misfits:
         style = "bold yellow"
     out.print()
-    out.print(with_flags(facts.verdict), style=style)
+    out.print(ascii_of(with_flags(facts.verdict)), style=style)
 
 
 def show_table(table: Table, out: Console) -> None:

@@ -109,6 +109,20 @@ class _Mask:
     distances: Plane
     """``(H, W)``: distance to the edge, `_REACH` at it, less inside, more outside."""
 
+    @classmethod
+    def of(cls, road: Plane, ignored: Plane) -> _Mask:
+        """Return the edge of an ``(H, W)`` mask of 0 and 255, away from what is ignored."""
+        import cv2
+
+        edge = _edge(road, ignored)
+        x, y = _points(edge)
+        normals = _slopes(road)[y, x]
+        away = cv2.distanceTransform((edge == 0).astype(np.uint8), cv2.DIST_L2, 3)
+        away = np.asarray(np.minimum(away, _REACH) + 0.5, np.uint8)
+        distances = np.where(road > 0, _REACH - away, _REACH + away)
+        normals /= np.maximum(abs(normals), np.float32(1e-9))
+        return cls(x, y, normals, distances)
+
     def turn(self, way: int) -> _Mask:
         """Return it with left and right exchanged if ``way`` is 1, or upside down if it is 0."""
         last = self.distances.shape[way] - 1
@@ -153,20 +167,6 @@ def _points(edge: Plane) -> _Points:
     places = np.flatnonzero(inner != 0)
     y, x = np.divmod(places[:: max(1, len(places) // _POINTS)], inner.shape[1])
     return x + _MARGIN, y + _MARGIN
-
-
-def _mask(road: Plane, ignored: Plane) -> _Mask:
-    """Return the edge of an ``(H, W)`` mask of 0 and 255, away from what is ignored."""
-    import cv2
-
-    edge = _edge(road, ignored)
-    x, y = _points(edge)
-    normals = _slopes(road)[y, x]
-    away = cv2.distanceTransform((edge == 0).astype(np.uint8), cv2.DIST_L2, 3)
-    away = np.asarray(np.minimum(away, _REACH) + 0.5, np.uint8)
-    distances = np.where(road > 0, _REACH - away, _REACH + away)
-    normals /= np.maximum(abs(normals), np.float32(1e-9))
-    return _Mask(x, y, normals, distances)
 
 
 def _fit(mask: _Mask, image: _Slopes, other: _Points | None, moves: npt.NDArray[np.intp]) -> Floats:
@@ -281,7 +281,7 @@ class FitCheck:
         masks = {}
         for name, (road, ignored) in subjects.items():
             self._upside[name].append(_share_above(road, ignored))
-            edge = masks[name] = _mask(road, ignored)
+            edge = masks[name] = _Mask.of(road, ignored)
             if name != TRUTH and view.truth is not None:
                 normals = np.array([edge.normals.imag, edge.normals.real])[:, None]
                 outward = np.rint(_GROWTHS[:, None] * normals).astype(np.intp)

@@ -24,6 +24,7 @@ from roadeval.fleet.drives import (
 from roadeval.fleet.engine import ATTEMPTS, is_worker_death, start_workers
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run.fleet_work import (
+    GO_ON,
     Done,
     DriveTask,
     FoldModel,
@@ -170,7 +171,7 @@ class FleetRun:
             try:
                 digest = sha256_of(Path(model))
             except OSError as error:
-                raise FleetError(f"{model}: cannot read the model: {error.strerror}") from error
+                raise FleetError(f"cannot read the model: {error.strerror}", where=model) from error
         for entry in self.entries:
             yield self._task(entry, entry.config(self.config), digest, None)
 
@@ -261,8 +262,9 @@ class FleetRun:
                 raise error
             case CancelledError():
                 raise FleetError(
-                    f"{self.folder}: the workers have gone, or their scheduler; what is done is "
-                    "kept, and the same command again does the rest"
+                    "the workers have gone, or their scheduler",
+                    where=self.folder,
+                    remedy=GO_ON,
                 ) from error
         if is_worker_death(error):
             return (

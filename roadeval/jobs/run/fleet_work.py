@@ -119,7 +119,7 @@ def replay_drive(task: DriveTask) -> Done:
     _check_software(task.software, task.config)
     model = task.config.training.model
     if task.model and sha256_of(Path(model or "")) != task.model:
-        raise FleetError(f"{model}: has changed since the command began; give it again")
+        raise FleetError("has changed since the command began", where=model, remedy="give it again")
     with ending_the_run(task.folder), claim_files(made_path(task.folder, task.entry.id)):
         made, repeated = find_valid(task), True
         if made is None:
@@ -247,6 +247,9 @@ def _remove(task: DriveTask, *folders: str) -> None:
             path.unlink(missing_ok=True)
 
 
+GO_ON: Final = "what is done is kept, and the same command again does the rest"
+
+
 @contextmanager
 def ending_the_run(folder: Path) -> Iterator[None]:
     """Turn what fails because of the fleet's disk, as every drive would, into a FleetError."""
@@ -258,21 +261,20 @@ def ending_the_run(folder: Path) -> Iterator[None]:
         failure = error if isinstance(error, OSError) else _disk_failure(error)
         if failure is None:
             raise
-        reason = (
-            f"{folder}: cannot be written: {os.strerror(failure.errno or errno.EIO)}"
-            if isinstance(failure, OSError)
-            else str(failure)
-        )
-        raise FleetError(
-            f"{reason}; what is done is kept, and the same command again does the rest"
-        ) from error
+        if isinstance(failure, OSError):
+            problem = f"cannot be written: {os.strerror(failure.errno or errno.EIO)}"
+            raise FleetError(problem, where=folder, remedy=GO_ON) from error
+        ended = FleetError.of(failure)
+        ended.remedy = GO_ON
+        raise ended from error
 
 
-def _disk_failure(error: BaseException | None) -> BaseException | None:
+def _disk_failure(error: BaseException | None) -> OSError | RecordingError | None:
     """Return the error that says that nothing can be written any more; None if none does."""
     while error is not None:
-        full = isinstance(error, OSError) and error.errno in FULL
-        if full or (isinstance(error, RecordingError) and isinstance(error.__cause__, OSError)):
+        if isinstance(error, OSError) and error.errno in FULL:
+            return error
+        if isinstance(error, RecordingError) and isinstance(error.__cause__, OSError):
             return error
         error = error.__cause__
     return None

@@ -27,7 +27,6 @@ from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
-from roadeval.results.verdict import focus_of
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
 from roadeval.runtime.sentence import Sentence
@@ -142,7 +141,7 @@ def _replay_log(
                     windows, shown = end.sums.windows, drawn[camera]
                     write_figures(results.folder, log.name, windows, shown, names[camera])
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
-    of_focus = finals(only(ended[0].sums.frames, variant=focus_of(facts.finals) or ""))
+    of_focus = finals(only(ended[0].sums.frames, variant=facts.focus or ""))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
     return Outcome(
         *(to.recording, to.reports, facts, tuple(facts.warnings), tuple(facts.losses)),

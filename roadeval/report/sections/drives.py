@@ -64,8 +64,7 @@ def plots(findings: FleetFolder) -> Iterator[Block]:
         plot = [forest(rows, effect.rates[TESTED], label)] if len(rows) else []
         yield from [Details(title, plot)] if place else [Heading(title, 2), *plot]
     blocks = [drives_table(findings, NAMED), note("units")]
-    focus = findings.facts.focus
-    yield Details(f"Drives with the highest error rate of {focus}", blocks)
+    yield Details(f"Drives with the highest error rate of {findings.facts.focus}", blocks)
 
 
 def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:

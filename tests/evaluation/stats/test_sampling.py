@@ -116,8 +116,7 @@ def bursts(seed, doubt, count, length):
     return scores, rates
 
 
-@pytest.mark.parametrize("labels", [10, 20])
-@pytest.mark.parametrize("doubt", [0.03, 0.1])
+@pytest.mark.parametrize(("labels", "doubt"), [(10, 0.03), (20, 0.1)])
 @pytest.mark.parametrize(("count", "length"), [(3, 6), (1, 20), (8, 3)])
 def test_rare_bursts_that_the_scores_tell_of_are_within_the_interval(labels, doubt, count, length):
     """Without scores the interval holds in 20 to 60 % of the draws, whatever its confidence."""

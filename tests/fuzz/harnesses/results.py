@@ -73,4 +73,4 @@ def seeds() -> list[bytes]:
     return [*found, found[0][: len(found[0]) * 3 // 4]]
 
 
-HARNESS = Harness(check, seeds, quick=8)
+HARNESS = Harness(check, seeds, quick=5)

@@ -16,7 +16,7 @@ from tests.logs.truth.test_shapes import labelme as square_of_labelme
 from tests.logs.truth.test_shapes import labels_of, percent, task
 
 IMAGES = 5
-FILES = 40
+FILES = 24
 """Numbers of images and of changed files, for each format."""
 BAD = (None, "x", [], {}, math.nan, math.inf, 1e300, [None], [[]], "")
 

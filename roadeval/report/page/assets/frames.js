@@ -20,6 +20,12 @@ class Browser {
         this.stage.draw();
       });
       this.stage = new Stage(element.querySelector(".stage"), this.film);
+      element.classList.add("filmed");
+      // A browser that cannot play it shows the pictures of the worst frames.
+      this.film.video.addEventListener("error", () => {
+        element.classList.remove("filmed");
+        for (const part of [this.stage.element, this.playButton]) part.hidden = true;
+      });
     }
     this.tools();
     this.filters();
