@@ -27,7 +27,6 @@ from roadeval.report.blocks import (
     KeepTogether,
     Report,
     Table,
-    TableOfContents,
     plain,
 )
 from roadeval.report.captions import caption
@@ -207,7 +206,7 @@ def _flat(blocks: Iterable[Block]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, KeepTogether):
             yield from _flat(block.blocks)
-        elif not isinstance(block, TableOfContents):  # a page always has an outline
+        else:
             yield block
 
 

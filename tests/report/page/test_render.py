@@ -23,7 +23,6 @@ from roadeval.report.blocks import (
     Picture,
     Strip,
     Table,
-    TableOfContents,
     Text,
     TwoColumns,
 )
@@ -59,7 +58,6 @@ def every_block(text):
         KeepTogether([Text(text)]),
         TwoColumns([Text(text)], [Text(text)]),
         LinkList([(text, "0/")]),
-        TableOfContents(),
         FrameBrowser([row], [text], [CHART], text.format, strips=[strip]),
     ]
 

@@ -219,7 +219,9 @@ class ChartView {
     const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
     this.element.querySelector(".xs").replaceChildren(
       ...ticks.map((tick) => {
-        const text = svg("text", { x: `${(100 * (tick - low)) / (high - low)}%`, y: 14 });
+        const place = (100 * (tick - low)) / (high - low);
+        // The last number stays inside.
+        const text = svg("text", { x: `${place}%`, y: 14, ...(place > 97 ? { class: "last" } : {}) });
         text.textContent = tick;
         return text;
       }),
