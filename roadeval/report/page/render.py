@@ -124,8 +124,16 @@ def _environment() -> Any:
         trim_blocks=True,
         finalize=lambda value: visible(value) if type(value) is str else value,
     )
+    environment.filters["coded"] = _coded
     environment.filters["tojson_text"] = lambda value: json.dumps(value, separators=(",", ":"))
     return environment
+
+
+def _coded(text: str) -> Any:
+    """Return a text as markup, with names of settings between backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(visible(text))))
 
 
 def _source(image: ImageFile | bytes) -> str:
