@@ -133,7 +133,7 @@ def _coded(text: str) -> Any:
     """Return a text as markup, with names of settings between backticks as code."""
     from markupsafe import Markup, escape
 
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(visible(text))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(visible(text)))))
 
 
 def _source(image: ImageFile | bytes) -> str:

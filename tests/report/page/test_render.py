@@ -85,7 +85,8 @@ class Reader(HTMLParser):
 
 def test_names_of_settings_are_code_and_nothing_else_is_markup():
     text = "set `labels.road`, not `<b>`"
-    parts = rendered(Text(text), BulletList("", [text]), Table(["a"], [[text]])).elements
+    blocks = Text(text), BulletList("", [text]), Table(["a"], [[text]])
+    parts = Reader(rendered(*blocks)).elements
     assert [tag for tag, _ in parts].count("code") == 6
     assert "b" not in [tag for tag, _ in parts]
 
