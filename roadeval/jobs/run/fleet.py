@@ -260,9 +260,7 @@ class FleetRun:
                 raise error
             case CancelledError():
                 raise FleetError(
-                    "the workers have gone, or their scheduler",
-                    where=self.folder,
-                    remedy=GO_ON,
+                    "the workers have gone, or their scheduler", where=self.folder, remedy=GO_ON
                 ) from error
         if is_worker_death(error):
             return (
