@@ -91,8 +91,8 @@ def frame(tab):
 # --- A page of one drive --------------------------------------------------------------------------
 
 
-def test_a_page_is_one_file_of_at_most_6_2_mb_and_asks_for_nothing(drive, watched):
-    assert drive.stat().st_size < 6_200_000
+def test_a_page_is_one_file_of_at_most_6_mb_and_asks_for_nothing(drive, watched):
+    assert drive.stat().st_size < 6_000_000
     assert {each.name for each in drive.parent.iterdir()} == {"page.html", "drive.rrd"}
     seen = watched(drive.as_uri())
     assert seen.elsewhere == []

@@ -136,7 +136,7 @@ SCRIPT_WORDS: Final = (
     "rates of a threshold",
 )
 """Captions that the script of a page fills in."""
-LARGE_ON_PAGE: Final = 640
+LARGE_ON_PAGE: Final = 520
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
