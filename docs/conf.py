@@ -24,7 +24,10 @@ lexers["csv"] = TextLexer()
 project = "roadeval"
 author = "the roadeval authors"
 release = roadeval.__version__
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx_copybutton"]
+# What commands print is no text to copy.
+copybutton_selector = "div:not(.highlight-text) > div.highlight > pre"
+copybutton_prompt_text = "$ "
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = f"roadeval {release}"
