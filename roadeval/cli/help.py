@@ -58,9 +58,10 @@ class GroupedCommand(TyperCommand):
         arguments = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
         return ["[OPTIONS]", *(str(argument.metavar) for argument in arguments)]
 
-    def format_help_text(self, ctx: Any, formatter: Any) -> None:
-        """Write what the command does, examples, the options, and the explanations."""
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write what the command does, examples, the options, explanations, and exit codes."""
         line, examples, *explanations = str(self.help).split("\n\n")
+        self.format_usage(ctx, formatter)
         formatter.write_paragraph()
         with formatter.indentation():
             formatter.write_text(f"{line}\n\n\b\n{textwrap.dedent(examples)}")
@@ -68,9 +69,6 @@ class GroupedCommand(TyperCommand):
         formatter.write_paragraph()
         with formatter.indentation():
             formatter.write_text("\n\n".join([*explanations, EXIT_CODES]))
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write nothing, as the options stand before the explanations."""
 
 
 def _write_groups(command: Any, ctx: Any, formatter: Any) -> None:

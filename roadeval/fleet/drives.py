@@ -31,7 +31,7 @@ from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.logs.files import METADATA, files_of, natural
 from roadeval.logs.settings import CameraSettings, LogConfig
-from roadeval.runtime.files import sha256_of
+from roadeval.runtime.files import reading, sha256_of
 from roadeval.runtime.settings import Checked
 from roadeval.runtime.text import public_url, visible, without_secrets
 
@@ -325,14 +325,12 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
 
 
 def _drives_of(word: str) -> Iterator[DriveEntry]:
-    try:
+    with reading(visible(word), FleetError):
         path = Path(word)
         if is_url(word) or path.suffix != MANIFEST or not path.is_file():
             yield from map(entry_of, _sources(word, Path()))
         else:
             yield from read_manifest(path)
-    except OSError as error:
-        raise FleetError(error.strerror or str(error), where=visible(word)) from error
 
 
 def _sources(word: str, base: Path) -> list[str]:

@@ -14,7 +14,7 @@ from roadeval.logs.container.file import Damage
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import NS
-from roadeval.runtime.files import check_input
+from roadeval.runtime.files import check_input, reading
 from roadeval.runtime.text import visible
 
 _HEAD: Final = 64
@@ -83,10 +83,8 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
         if problem := _problem(path):
             raise LogError(problem, where=path)
         return [path], []
-    try:
+    with reading(path, LogError):
         inside = sorted(filter(is_shown, path.iterdir()), key=natural)
-    except OSError as error:
-        raise LogError(str(error.strerror or error), where=path) from error
     there = [file for file in inside if file.suffix == ".mcap"]
     problems = {file: problem for file in there if (problem := _problem(file))}
     damage = [Damage(file, 0, problem) for file, problem in problems.items()]

@@ -150,9 +150,7 @@ class LabelSettings:
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
             raise SettingError(
-                Sentence("needs {road}"),
-                setting="ignore",
-                remedy="name the values that mean road",
+                Sentence("needs {road}"), setting="ignore", remedy="name the values that mean road"
             )
         if self.ignore_colors and not self.road_colors:
             raise SettingError(

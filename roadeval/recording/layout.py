@@ -146,6 +146,11 @@ class Layout:
                     "itself, or no path in it can hold it; choose another"
                 )
 
+    @property
+    def shown(self) -> tuple[VariantLayout, ...]:
+        """The variants in the viewer's order: the focus first."""
+        return tuple(sorted(self.variants, key=lambda variant: variant.name != self.focus))
+
     def images(self) -> Iterator[tuple[str, LayerSpec]]:
         """Yield the entity path and description of every layer, truth and errors included."""
         if self.has_truth:

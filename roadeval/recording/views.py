@@ -112,11 +112,11 @@ def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
     """Return the first tab of a rig: each camera with its first variant's errors, and curves."""
     names, pictures, paths = short_names([*layouts]), [], []
     for prefix, layout in layouts.items():
-        view = outcome(layout, layout.variants[0])
+        view = outcome(layout, layout.shown[0])
         view.name = f"{names[prefix]}: {view.name}"
         _add_prefix(prefix, [view])
         pictures.append(view)
-        variants = layout.variants[:_ROWS] if layout.has_truth else ()
+        variants = layout.shown[:_ROWS] if layout.has_truth else ()
         paths += [f"{prefix}/metrics/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
     curves = [plot(f"{TESTED} by camera ({_UNIT})", paths)] if paths else []
     below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
@@ -159,7 +159,7 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
 
 def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
     """Return the ground in space, below the camera, and from above with each variant's errors."""
-    names = [v.name for v in layout.variants[:_OUTCOMES]] if layout.has_truth else []
+    names = [v.name for v in layout.shown[:_OUTCOMES]] if layout.has_truth else []
     shown = {"Truth: road": TRUTH.name} if layout.has_truth else {}
     shown |= {f"{name}: errors": name for name in names}
     flat = [picture(title, at.GROUND, f"/ground/{name}") for title, name in shown.items()]
@@ -190,12 +190,12 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
 
 def overview(layout: Layout) -> BlueprintPart:
     """Return the first tab."""
-    rows = {variant.name: _cells(variant) for variant in layout.variants[:_ROWS]}
+    rows = {variant.name: _cells(variant) for variant in layout.shown[:_ROWS]}
     columns = max(map(len, rows.values()))
     shortest = min(rows, key=lambda name: len(rows[name]))
     aside = {shortest: _events()} if len(rows[shortest]) + 1 < columns else {}
     pictures = [camera(), *([truth()] if layout.has_truth else [])]
-    pictures += [outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]]
+    pictures += [outcome(layout, variant) for variant in layout.shown[:_OUTCOMES]]
     return rrb.Vertical(
         rrb.Horizontal(*pictures, document(at.GUIDE, "What you see")),
         *(
@@ -248,7 +248,7 @@ def _row(
 def _curves(layout: Layout) -> list[BlueprintPart]:
     """Return graphs of the final masks' rates, or without truth of the stages' times."""
     if not layout.has_truth:
-        return [stage_times(variant) for variant in layout.variants[:_ROWS]]
+        return [stage_times(variant) for variant in layout.shown[:_ROWS]]
     finals = [f"{variant.name}/{variant.stages[-1]}" for variant in layout.variants]
     finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
     return [
@@ -537,7 +537,7 @@ def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
     The guide begins with the verdict on the drive; a header has the variant's name, its title, and
     the rates of its final mask.
     """
-    names = [as_markdown(variant.name) for variant in layout.variants]
+    names = [as_markdown(variant.name) for variant in layout.shown]
     others = " and ".join(names[_ROWS:])
     rows = _ROW_GUIDE.format(
         rows=" and ".join(names[:_ROWS]),
@@ -545,13 +545,13 @@ def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
     )
     parts = [_ERRORS, rows, _CURVES] if layout.has_truth else [_NO_TRUTH, rows]
     yield _guide(layout.drive, str(summary.get("verdict", "")), *parts, _HANDLING)
-    for variant, name in zip(layout.variants, names, strict=True):
+    for variant, name in zip(layout.shown, names, strict=True):
         rates = summary.get("totals", {}).get(variant.name, {}).get(variant.stages[-1], {})
         # A heading would break the name in such a narrow column.
-        parts = [f"**{name}**  \n{as_markdown(variant.title)}"]
         drive = [f"{rate} {percent(rates[rate])} %" for rate in SHORT if rate in rates]
-        parts += ["  \n".join(["Drive:", *drive])] if drive else []
-        yield f"{at.GUIDE}/{variant.name}", [_markdown("\n\n".join(parts) + "\n")]
+        parts = [f"**{name}**", "  \n".join(["Drive:", *drive] if drive else [])]
+        parts.append(as_markdown(variant.title))
+        yield f"{at.GUIDE}/{variant.name}", [_markdown("\n\n".join(filter(None, parts)) + "\n")]
 
 
 def _guide(drive: str, verdict: str, *parts: str) -> tuple[str, list[Any]]:

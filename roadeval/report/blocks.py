@@ -249,13 +249,6 @@ class TwoColumns(Block):
 
 
 @dataclass(frozen=True)
-class TableOfContents(Block):
-    """The document's headings with their pages, down to a level."""
-
-    depth: int = 1
-
-
-@dataclass(frozen=True)
 class Report(Block):
     """A report: a title and blocks."""
 

@@ -35,10 +35,10 @@ def document(findings: Findings | FleetFolder) -> Report:
         return _compose(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
-    # Frames fill pages, so they come last.
+    # Frames fill pages, so they come late.
     scored = (drive.over_drive, *SCORED) if findings.totals else (drive.masks,)
     gallery = (frames.worst_frames,) if findings.totals or findings.worst else ()
-    return _compose(findings, *scored, provenance.section, *gallery)
+    return _compose(findings, *scored, *gallery, provenance.section)
 
 
 def page_document(
@@ -83,6 +83,9 @@ def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
 
 def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
     preset = findings.facts.run.get("preset")
+    ran = findings.finals if isinstance(findings, FleetFolder) else findings.facts.settings
+    if {FILTERED, UNFILTERED}.isdisjoint(ran):  # the preset's chain did not run
+        preset = None
     if isinstance(findings, FleetFolder):
         version = findings.facts.version
         yield f"{number(len(findings.facts.drives))} drives"

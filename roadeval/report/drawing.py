@@ -100,11 +100,6 @@ class Shape:
         """The line as an SVG path."""
         return "".join("M" + "L".join(f"{x:g} {y:g}" for x, y in run) for run in self.runs)
 
-    @property
-    def dots(self) -> str:
-        """The marks as an SVG path of lines without length and with round ends."""
-        return "".join(f"M{x:g} {y:g}h0" for x, y in self.marks)
-
 
 @dataclass(frozen=True)
 class Mark:

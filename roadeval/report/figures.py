@@ -180,31 +180,27 @@ def _over_drive(
     title: str, windows: pd.DataFrame, rates: Mapping[str, str], width: float
 ) -> Figure:
     """Draw the rates of every variant's final mask over the drive, one rate below the other."""
-    charts = over_windows(windows, [*rates])
-    head = []
-    if title:
-        stages = ", ".join(values_of(finals(windows), "stage"))
-        about = f"Final mask ({stages}); {describe_points(windows, CROWDED)}; lower is better."
-        head = _head(title, about, width - AXIS - EDGE)
+    charts, across = over_windows(windows, [*rates]), width - AXIS - EDGE
+    stages = ", ".join(values_of(finals(windows), "stage"))
+    about = f"Final mask ({stages}); {describe_points(windows, CROWDED)}; lower is better."
     short = short_end(windows, CROWDED)
     size, words = (SMALL, {}) if width < NARROW else (LETTERS, _LABELS)
     names = [words.get(series.name, series.name) for series in charts[0].series]
     names += [f"mean of {short[0]}"] if short else []
     labels = [elide(name, _LONGEST) for name in names]
     longest = size * (0.57 * max(map(len, labels)) + HANDLE + 2)
-    room = 72 * (width - AXIS - EDGE) + 1.2 * size
-    columns = min(max(int(room // longest), 1), 3)
-    rows = -(-len(labels) // columns)
-    height, top = min(2.0, 0.55 * width), EDGE + _height_of(head) + 0.2 * rows
-    total = top + (height + GAP_OF_AXES) * len(charts) + FOOT
-    figure = Figure(figsize=(width, total))
-    _write_head(figure, head, AXIS)
+    columns = min(max(int((72 * across + 1.2 * size) // longest), 1), 3)
+    height = min(2.0, 0.55 * width)
+    step = height + GAP_OF_AXES
+    below = 0.2 * -(-len(labels) // columns) + step * len(charts) + FOOT
+    figure = _titled(title, about, width, AXIS, below)
+    total = figure.get_figheight()
     for place, (chart, label) in enumerate(zip(charts, rates.values(), strict=True)):
-        bottom = total - top - (place + 1) * height - place * GAP_OF_AXES
-        box = AXIS / width, bottom / total, 1 - (AXIS + EDGE) / width, height / total
+        bottom = FOOT + GAP_OF_AXES + step * (len(charts) - 1 - place)
+        box = AXIS / width, bottom / total, across / width, height / total
         ax = figure.add_axes(box, sharex=figure.axes[0] if place else None)
         ax.set_ylabel(label)
-        ax.yaxis.set_label_coords(-0.5 / (width - AXIS - EDGE), 0.5)
+        ax.yaxis.set_label_coords(-0.5 / across, 0.5)
         ax.tick_params(labelbottom=chart is charts[-1])
         _draw_rate(ax, chart)
         if short:
@@ -255,28 +251,23 @@ def _draw_rate(ax: Axes, chart: Chart) -> None:
     ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
 
 
-HeadLine = tuple[str, float, dict[str, Any]]
-"""A line above a figure, its height in inches and its look."""
+def _titled(title: str, about: str, width: float, left: float, height: float) -> Figure:
+    """Return a figure with ``height`` inches below a title and a text, if it has a title.
 
-
-def _head(title: str, about: str, width: float) -> list[HeadLine]:
-    """Return the lines of a title and of the text below it, ``width`` inches across."""
-    bold = {"size": 11, "weight": "bold", "color": INK, "va": "top"}
-    faint = {"size": 8.5, "color": FAINT, "va": "top"}
-    lines = [(line, 0.22, bold) for line in wrap(visible(title), int(9 * width))]
-    return lines + [(line, 0.17, faint) for line in wrap(about, int(14 * width))]
-
-
-def _height_of(head: Sequence[HeadLine]) -> float:
-    return sum(height for _, height, _ in head)
-
-
-def _write_head(figure: Figure, head: Sequence[HeadLine], left: float) -> None:
-    """Write lines at the top of a figure, ``left`` inches from its edge."""
-    (width, height), down = figure.get_size_inches(), EDGE
-    for line, step, look in head:
-        figure.text(left / width, 1 - down / height, line, **look)
+    Both are ``left`` inches from the edge.
+    """
+    bold: dict[str, Any] = {"size": 11, "weight": "bold", "color": INK, "va": "top"}
+    faint: dict[str, Any] = {"size": 8.5, "color": FAINT, "va": "top"}
+    room = width - left - EDGE
+    lines = [(line, 0.22, bold) for line in wrap(visible(title), int(9 * room))]
+    if title:
+        lines += [(line, 0.17, faint) for line in wrap(about, int(14 * room))]
+    total, down = EDGE + sum(step for _, step, _ in lines) + height, EDGE
+    figure = Figure(figsize=(width, total))
+    for line, step, look in lines:
+        figure.text(left / width, 1 - down / total, line, **look)
         down += step
+    return figure
 
 
 LEFT: Final = 0.28
@@ -293,11 +284,10 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame], width: float = WIDT
     pixels_down, pixels_across = rows[0]["camera image"].shape[:2]
     column_width = (width - LEFT) / len(rows[0])
     row_height = (column_width - GAP) * pixels_down / pixels_across + GAP
-    head = _head(f"Road masks on {drive}", _legend(examples), width - LEFT) if drive else []
-    top_of_rows = GAP + _height_of(head) + NAMES + (GAP if head else 0)
-    figure_height = top_of_rows + row_height * len(rows) + GAP
-    figure = Figure(figsize=(width, figure_height))
-    _write_head(figure, head, LEFT)
+    title, below = f"Road masks on {drive}" if drive else "", NAMES + row_height * len(rows) + GAP
+    figure = _titled(title, _legend(examples), width, LEFT, below)
+    figure_height = figure.get_figheight()
+    top_of_rows = figure_height - below + NAMES
     size = LETTERS if width >= NARROW else 7
 
     def write(x: float, y: float, text: str, **look: Any) -> None:

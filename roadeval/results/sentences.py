@@ -85,8 +85,8 @@ def correction(differences: Iterable[Difference]) -> str:
     if counts == [1]:
         return f"{MARK} the interval does not contain 0."
     return (
-        f"{MARK} not chance, even though several are compared (Holm's correction). Rows without "
-        f"{MARK} may be chance."
+        f"{MARK} not chance, even though several are compared (Holm's correction); rows without it "
+        "may be chance."
     )
 
 

@@ -17,7 +17,7 @@ import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -51,13 +51,18 @@ def list_paths(paths: Paths) -> list[AnyPath]:
 
 
 @contextmanager
-def writing(place: object, kind: Callable[[str], Exception]) -> Iterator[None]:
+def reading(place: object, kind: Callable[..., Exception], problem: str = "") -> Iterator[None]:
     """Turn an OSError inside the block into an error of a room, which ``kind`` makes."""
     try:
         yield
     except OSError as error:
-        why = error.strerror or error
-        raise kind(f"{place}: cannot be written: {why}") from error
+        reason = error.strerror or str(error)
+        raise kind(f"{problem}: {reason}" if problem else reason, where=place) from error
+
+
+def writing(place: object, kind: Callable[..., Exception]) -> AbstractContextManager[None]:
+    """Turn an OSError inside the block into an error of a room: it cannot be written."""
+    return reading(place, kind, "cannot be written")
 
 
 def check_input(path: str | Path) -> None:

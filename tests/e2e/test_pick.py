@@ -22,7 +22,6 @@ from tests.e2e.test_rig import a_rig
 HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
 QUICK = """
 preset = "robust"
-only = ["unfiltered"]
 trees.trees = 15
 training.pixels_per_class = 50
 """

@@ -60,6 +60,12 @@ def test_the_viewer_shows_each_frame_s_rates_in_percent_beside_the_drive_s(drive
     assert "Drive:  \nERR 2.79 %" in str(header.text.as_arrow_array())
 
 
+def test_the_viewer_shows_the_focus_first():
+    known = layout(variants=(VARIANT, replace(VARIANT, name="mine")), focus="mine")
+    names = [str(view.name) for view in views.overview(known).contents[0].contents]
+    assert [name for name in names if "errors" in name] == ["mine: errors", "filtered: errors"]
+
+
 def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tmp_path):
     bare = replace(drive[3], variants=(), errors={})
     recording = record(tmp_path / "out.rrd", [drive[2], bare, drive[4]])

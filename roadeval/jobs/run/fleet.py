@@ -40,7 +40,7 @@ from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
 from roadeval.results.fleet import FleetWriter
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.files import AnyPath, Paths, list_paths, sha256_of
+from roadeval.runtime.files import AnyPath, Paths, list_paths, reading, sha256_of
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
@@ -168,10 +168,8 @@ class FleetRun:
         """Yield the tasks of drives that one model scores, or that train their own."""
         digest, model = "", self.config.training.model
         if model:
-            try:
+            with reading(model, FleetError, "cannot read the model"):
                 digest = sha256_of(Path(model))
-            except OSError as error:
-                raise FleetError(f"cannot read the model: {error.strerror}", where=model) from error
         for entry in self.entries:
             yield self._task(entry, entry.config(self.config), digest, None)
 
@@ -262,9 +260,7 @@ class FleetRun:
                 raise error
             case CancelledError():
                 raise FleetError(
-                    "the workers have gone, or their scheduler",
-                    where=self.folder,
-                    remedy=GO_ON,
+                    "the workers have gone, or their scheduler", where=self.folder, remedy=GO_ON
                 ) from error
         if is_worker_death(error):
             return (

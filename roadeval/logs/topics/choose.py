@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.reader import TopicInfo
-from roadeval.runtime.sentence import Sentence
+from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.runtime.text import likely
 
 
@@ -321,7 +321,8 @@ def _only(
     ]
     best = [t for t, s in zip(topics, shared, strict=True) if s == max(shared)]
     if len(best) > 1:
-        raise LogError(f"{len(best)} {what} topics: {_names(best)}; choose one with {setting}")
+        remedy = Sentence("choose one with {}", Setting(setting))
+        raise LogError(f"{len(best)} {what} topics: {_names(best)}", remedy=remedy)
     return best[0] if best else None
 
 

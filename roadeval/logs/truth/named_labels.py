@@ -33,6 +33,7 @@ from roadeval.logs.files import (
 )
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.settings import LabelPlace
+from roadeval.runtime.files import reading
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import visible
 
@@ -119,10 +120,8 @@ class NamedLabels:
         """The SHA-256 of all keys and labels in hexadecimal; a `LogError` if one is unreadable."""
         digest = hashlib.sha256()
         for key, label in zip(self.log_times.tolist(), self.labels, strict=True):
-            try:
+            with reading(label.path, LogError):
                 content = label.content()
-            except OSError as error:
-                raise LogError(str(error.strerror), where=label.path) from error
             digest.update(f"{key} {hashlib.sha256(content).hexdigest()}\n".encode())
         return digest.hexdigest()
 

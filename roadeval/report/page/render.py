@@ -27,7 +27,6 @@ from roadeval.report.blocks import (
     KeepTogether,
     Report,
     Table,
-    TableOfContents,
     plain,
 )
 from roadeval.report.captions import caption
@@ -125,8 +124,16 @@ def _environment() -> Any:
         trim_blocks=True,
         finalize=lambda value: visible(value) if type(value) is str else value,
     )
+    environment.filters["coded"] = _coded
     environment.filters["tojson_text"] = lambda value: json.dumps(value, separators=(",", ":"))
     return environment
+
+
+def _coded(text: str) -> Any:
+    """Return a text as markup, with names of settings between backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(visible(text)))))
 
 
 def _source(image: ImageFile | bytes) -> str:
@@ -207,7 +214,7 @@ def _flat(blocks: Iterable[Block]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, KeepTogether):
             yield from _flat(block.blocks)
-        elif not isinstance(block, TableOfContents):  # a page always has an outline
+        else:
             yield block
 
 

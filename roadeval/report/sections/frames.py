@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from roadeval.data import ERRORS
@@ -89,12 +89,17 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
         yield TwoColumns([title, *sentences], [rates], 0.55)
     else:
         yield from (title, *sentences)
-    if frame.images:
-        pictures = [(image.title, jpeg(image, LARGE)) for image in frame.images]
+    images, layers = frame.images, frame.layers
+    if layers and not frame.rates:  # masks are what there is to look at
+        finals = [(row[0].title.partition(":")[0], row[-1]) for row in layers if row]
+        images = [*images, *(replace(mask, title=f"{name}: road") for name, mask in finals)]
+        layers = [row[:-1] for row in layers[:1]]
+    if images:
+        pictures = [(image.title, jpeg(image, LARGE)) for image in images]
         lines = -(-len(pictures) // MOST)
         yield ImageGrid(pictures, max(LEAST, -(-len(pictures) // lines)))
-    columns = max((len(row) for row in frame.layers), default=0)
-    for row in frame.layers:
+    columns = max((len(row) for row in layers), default=0)
+    for row in layers:
         pictures = [(image.title, jpeg(image, SMALL)) for image in row]
         yield ImageGrid(pictures, columns, skip=columns - len(row))
     if findings.inspect:
@@ -103,14 +108,8 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
 
 def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
     """Tabulate the rates of each variant's final mask; ``variants`` are all scored variants."""
-    rows = [
-        [
-            variant_cell(name, variants),
-            *(
-                Cell(percent(rates.get(rate)), bold=(name, rate) == (frame.variant, TESTED))
-                for rate in SHORT
-            ),
-        ]
+    rows: list[list[Cell | str]] = [
+        [variant_cell(name, variants), *(percent(rates.get(rate)) for rate in SHORT)]
         for name, rates in frame.rates.items()
     ]
     return Table(["final mask, %", *SHORT], rows, small=True)

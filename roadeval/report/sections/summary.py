@@ -14,7 +14,6 @@ from roadeval.report.blocks import (
     Heading,
     ImageGrid,
     LinkList,
-    TableOfContents,
     Text,
 )
 from roadeval.report.captions import caption, note
@@ -83,7 +82,6 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
         yield note("weights of drives")
     yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
     yield _beware([*fleet_warnings(findings)])
-    yield TableOfContents()
 
 
 def _beware(sentences: list[str]) -> BulletList:

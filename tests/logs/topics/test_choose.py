@@ -13,6 +13,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.settings import LabelSettings, LogConfig, TopicSettings
 from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth
 from roadeval.logs.topics.reader import TopicInfo
+from roadeval.runtime.sentence import name_settings
 from tests.logs.making import SECOND, compressed, grey, jpeg, raw, ros2_log
 
 
@@ -206,3 +207,11 @@ def test_another_cameras_shadow_is_left_out(tmp_path: Path) -> None:
     path = rig(tmp_path, {FRONT: "", REAR: ""}, {"/camera/front/shadow_mask": ""})
     assert selected(path, FRONT).shadow is not None
     assert selected(path, REAR).shadow is None
+
+
+def test_the_setting_that_chooses_one_of_several_truths_is_known_as_one(tmp_path: Path) -> None:
+    path = rig(tmp_path, {"/image": ""}, {"/labels": "", "/road_mask": ""})
+    with pytest.raises(LogError, match="2 label topics: /labels, /road_mask; ") as refused:
+        selected(path, "/image")
+    flagged = name_settings(refused.value.sentence, {"topics.truth": "--truth-topic"}.get)
+    assert flagged.endswith("choose one with --truth-topic")

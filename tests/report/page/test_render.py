@@ -14,6 +14,7 @@ from roadeval.report.blocks import (
     Cell,
     Command,
     Details,
+    DriveRow,
     Figure,
     Heading,
     ImageFile,
@@ -23,7 +24,6 @@ from roadeval.report.blocks import (
     Picture,
     Strip,
     Table,
-    TableOfContents,
     Text,
     TwoColumns,
 )
@@ -59,7 +59,7 @@ def every_block(text):
         KeepTogether([Text(text)]),
         TwoColumns([Text(text)], [Text(text)]),
         LinkList([(text, "0/")]),
-        TableOfContents(),
+        DriveRow(text, text, replace(CHART, low=True), "0/", [(text, JPEG)]),
         FrameBrowser([row], [text], [CHART], text.format, strips=[strip]),
     ]
 
@@ -81,6 +81,14 @@ class Reader(HTMLParser):
 
     def all(self, tag):
         return [attributes for name, attributes in self.elements if name == tag]
+
+
+def test_names_of_settings_are_code_and_nothing_else_is_markup():
+    text = "set `labels.road`, not `<b>`"
+    blocks = Text(text), BulletList("", [text]), Table(["a"], [[text]])
+    parts = Reader(rendered(*blocks)).elements
+    assert [tag for tag, _ in parts].count("code") == 6
+    assert "b" not in [tag for tag, _ in parts]
 
 
 def rendered(*blocks):

@@ -17,6 +17,7 @@ from roadeval.report.blocks import (
     Details,
     Figure,
     Heading,
+    ImageGrid,
     KeepTogether,
     Table,
     Text,
@@ -29,7 +30,7 @@ from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
 from roadeval.report.sections.drive import filter_effect, over_drive, regions, thresholds
-from roadeval.report.sections.frames import FrameBrowser, strip, worst_frames
+from roadeval.report.sections.frames import FrameBrowser, notable_frame, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
 from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import differences_table, rates_table, stages_table
@@ -293,3 +294,18 @@ def test_figures_are_the_paper_s_if_its_pipeline_ran_and_a_short_last_point_is_s
     first, *others = (block for block in details.blocks if isinstance(block, Figure))
     assert "each point is the mean of 10 frames, the last of 4." in first.caption
     assert not any("point" in figure.caption for figure in others)
+
+
+@pytest.mark.parametrize(("variant", "told"), [("unfiltered", True), ("net", False)])
+def test_the_preset_is_told_if_its_chain_ran(variant, told):
+    found = some_findings(run={"preset": "paper"}, settings={variant: {}})
+    assert ("preset paper" in document(found).subtitle) == told
+
+
+def test_without_truth_the_final_masks_are_large_and_of_the_steps_those_of_one_variant():
+    image = np.zeros((4, 6, 3), np.uint8)
+    rows = [[LayerImage(f"{name}: svm", image), LayerImage("post", image)] for name in ("a", "b")]
+    shown = NotableFrame(3, 0, "", {}, images=[LayerImage("camera", image)], layers=rows)
+    grids = [b for b in notable_frame(some_findings(), shown) if isinstance(b, ImageGrid)]
+    titles = [[title for title, _ in grid.pictures] for grid in grids]
+    assert titles == [["camera", "a: road", "b: road"], ["a: svm"]]

@@ -39,14 +39,14 @@ function tipHead(text) {
   return head;
 }
 
-/** A name with its value. */
-function tipLine(name, value, colour = null) {
+/** A name with its value, behind a variant's mark. */
+function tipLine(name, value, mark = null) {
   const line = document.createElement("p");
   const bold = document.createElement("b");
   bold.textContent = value;
-  if (colour) {
-    const dot = svg("svg", { class: "dot", viewBox: "0 0 10 10" });
-    dot.append(svg("circle", { cx: 5, cy: 5, r: 4.4, fill: colour }));
+  if (mark) {
+    const dot = svg("svg", { class: "dot", viewBox: "-6 -6 12 12" });
+    dot.append(mark.cloneNode());
     line.append(dot);
   }
   line.append(name, bold);
@@ -174,6 +174,12 @@ class ChartView {
     return far && !this.values.frames ? -1 : place;
   }
 
+  /** The mark of a series in this figure's legend, or in a table of variants. */
+  markOf(name) {
+    const names = [...(this.element.closest("figure")?.querySelectorAll(".legend li") ?? []), ...document.querySelectorAll(".with-dot")];
+    return names.find((part) => part.textContent.trim() === name)?.querySelector(".mark");
+  }
+
   shownSeries() {
     return this.values.series.filter((series) => isShown(series.name));
   }
@@ -184,7 +190,7 @@ class ChartView {
       const place = this.placeIn(series);
       const value = place < 0 ? null : series.y[place];
       const isOmitted = value === null && shown.length > 1 && (unit === "pp" || !this.values.frames);
-      return isOmitted ? null : tipLine(series.name, withEnds(value, series.low?.[place], series.high?.[place], unit), series.colour);
+      return isOmitted ? null : tipLine(series.name, withEnds(value, series.low?.[place], series.high?.[place], unit), this.markOf(series.name));
     });
     if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
     this.tip.replaceChildren(tipHead(this.where()), ...lines.filter(Boolean));
@@ -206,11 +212,16 @@ class ChartView {
   show(low, high) {
     [this.low, this.high] = [low, high];
     this.driveButton.hidden = low === range.drive[0] && high === range.drive[1];
+    for (const point of this.element.querySelectorAll(".points > g > svg")) {
+      point.setAttribute("x", `${(100 * (Number(point.dataset.x) - this.share(low))) / (this.share(high) - this.share(low))}%`);
+    }
     this.area.setAttribute("viewBox", `${this.share(low)} 0 ${this.share(high) - this.share(low)} 100`);
     const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
     this.element.querySelector(".xs").replaceChildren(
       ...ticks.map((tick) => {
-        const text = svg("text", { x: `${(100 * (tick - low)) / (high - low)}%`, y: 14 });
+        const place = (100 * (tick - low)) / (high - low);
+        // The last number stays inside.
+        const text = svg("text", { x: `${place}%`, y: 14, ...(place > 97 ? { class: "last" } : {}) });
         text.textContent = tick;
         return text;
       }),

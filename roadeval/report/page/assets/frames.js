@@ -202,7 +202,7 @@ class Browser {
     const countsIn = (name) => counts[name].filter((frame, place) => frame && isInRange(frames[place]));
     const [inside, ofFocus] = [frames.filter((frame) => isInRange(frame)), counts[choice.focus]];
     const rates = (name) => Object.fromEntries(["ERR", "FNR", "FPR"].map((rate) => [rate, percent(meanRate(rate, countsIn(name)), 1)]));
-    this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus] ?? this.verdictOfDrive);
+    this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus]?.replaceAll("`", "") ?? this.verdictOfDrive);
     if (isNarrow && ofFocus) {
       const others = Object.keys(counts).filter((name) => name !== choice.focus && isShown(name));
       const told = others.map((name) => fill(words["error of a range"], { variant: name, ...rates(name) })).join(" ");

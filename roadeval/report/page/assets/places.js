@@ -23,11 +23,7 @@ class RowsView {
     this.tip = makeTip(element);
     element.tabIndex = 0;
     for (const [number, row] of this.rows.entries()) {
-      // The browser's own words would stand beside ours.
-      row.marks = [...row.querySelectorAll("circle")].map((mark) => {
-        mark.querySelector("title").remove();
-        return [mark.dataset.text, mark.getAttribute("fill")];
-      });
+      row.marks = [...row.querySelectorAll("[data-text]")].map((mark) => [mark.dataset.text, mark]);
       row.addEventListener("pointermove", () => this.point(number));
     }
     element.addEventListener("pointerleave", () => this.point(null));
@@ -52,9 +48,9 @@ class RowsView {
     if (number === null) return;
     const row = this.rows[number];
     row.classList.add("pointed");
-    const lines = row.marks.filter(([text]) => isShown(text)).map(([text, colour]) => {
+    const lines = row.marks.filter(([text]) => isShown(text)).map(([text, mark]) => {
       const [, name, value] = /^(.*?): ([^:]*)$/s.exec(text) ?? [null, text, ""];
-      return tipLine(name, value, colour);
+      return tipLine(name, value, mark);
     });
     this.tip.replaceChildren(tipHead(row.querySelector(".name").textContent), ...lines);
     const below = row.offsetTop + row.offsetHeight;
