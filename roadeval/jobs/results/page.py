@@ -1,4 +1,4 @@
-"""What a page shows of a drive: its video, its frames with pictures, and what can be chosen."""
+"""The content of a drive's page: its video, its frames with pictures, and what can be chosen."""
 
 from __future__ import annotations
 

@@ -167,6 +167,7 @@ class Browser {
   chosen(isNew = true) {
     const others = this.data.variants.filter((name) => name !== choice.focus && name !== "blind");
     this.stage?.prefer([choice.focus, choice.beside || others[0]]);
+    for (const view of along) view.show(view.low, view.high);
     this.filter();
     this.judge();
     this.setLevel(this.film?.levels[choice.focus]);
