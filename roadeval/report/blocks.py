@@ -130,11 +130,6 @@ class Cell(Block):
     look: Look | None = None
     """The look of its variant in charts, whose mark stands before the text."""
 
-    @property
-    def dot(self) -> str | None:
-        """The colour of the mark."""
-        return self.look.colour if self.look else None
-
 
 @dataclass(frozen=True)
 class Table(Block):
