@@ -286,11 +286,11 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
 
 
 def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path):
-    """A network, masks of the log and confidences beside it, each with what is tuned of it."""
+    """A network, and confidences beside the log, each with what is tuned of it."""
     drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(2)]
     beside = {"beside": confidences(tmp_path / "shares")}
-    topics, methods = {"masks": {"logged": "/net/mask"}}, ["mine", "logged", "beside"]
-    config = configure({**SMALL, "topics": topics, "masks": beside, "fleet": {"folds": 2}})
+    methods = ["mine", "beside"]
+    config = configure({**SMALL, "masks": beside, "fleet": {"folds": 2}})
     config = config.with_variants([network_variant("mine", str(folder / "red.onnx"))])
     config = small(config.with_tuned(methods), methods)
     with ThreadPoolExecutor(1) as executor:

@@ -1,4 +1,4 @@
-"""What a page shows of a drive: its video, its frames with pictures, and what can be chosen."""
+"""The content of a drive's page: its video, its frames with pictures, and what can be chosen."""
 
 from __future__ import annotations
 
@@ -43,6 +43,8 @@ BYTES: Final = 9_900_000
 """Size of a page, at most."""
 FILMED: Final = 500
 """Frames of a page's video, at most: a longer drive is thinned."""
+PROBABILITY_LAYER: Final = "probability"
+"""The layer of a stage that tells how probable road is."""
 FILM_BYTES: Final = 30_000
 """Bytes of a page's video, at most, for each frame; a third more as text of the page."""
 
@@ -93,13 +95,13 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
             by_level = np.zeros((2, LEVELS), np.int64)
             by_level[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
             counts = [facts.totals[variant][stage][name] for name in OUTCOMES]
-            line = "threshold = {}"
+            line, is_own = "threshold = {}", stage in settings
             if stage == "net":
                 network = json.dumps(settings["net"]["file"])
                 line = f"# for --net {variant}={variant}.toml\nfile = {network}\n{line}"
-            elif stage in settings:
+            elif is_own:
                 line = f"# in the settings of {variant}\n[{stage}]\n{line}"
-            yield ThresholdSlider(variant, stage, now, line, counts, by_level)
+            yield ThresholdSlider(variant, stage, now, line, counts, by_level, reached=not is_own)
 
 
 def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> Film | None:
@@ -113,12 +115,14 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
     scored = {*result.rows["frame"]}
     there = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
     chosen = sorted({*evenly(there, FILMED), *_choose_frames(result, PICTURED)})
-    names = [variant.name for variant in recording.variants]
     finals_of = {variant.name: variant.stages[-1] for variant in recording.variants}
-    probable = [name for name in result.facts.curves if name in names]
+    layers = {
+        variant.name: {spec.name for spec in variant.layers} for variant in recording.variants
+    }
+    probable = [name for name in result.facts.curves if PROBABILITY_LAYER in layers.get(name, ())]
     panels = [
         *(CAMERA, *[TRUTH_PANEL] * bool(scored)),
-        *map(MASK.format, names),
+        *map(MASK.format, finals_of),
         *map(PROBABILITY.format, probable),
     ]
 
@@ -131,7 +135,7 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
             if (mask := result.layer(name, stage, frame)) is not None:
                 yield MASK.format(name), mask * np.uint8(255)
         for name in probable:
-            if (probability := result.layer(name, "probability", frame)) is not None:
+            if (probability := result.layer(name, PROBABILITY_LAYER, frame)) is not None:
                 yield PROBABILITY.format(name), (probability * 255).astype(np.uint8)
 
     while True:
@@ -142,7 +146,7 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
-    """Return frames with their pictures, in the drive's order: the worst, the best, and others.
+    """Return frames with their pictures, in the drive's order: the worst, and others.
 
     At most `PICTURED`, and as many as have room in so many bytes of a page.
     """
@@ -162,7 +166,7 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
 
 
 def _choose_frames(result: DriveResult, count: int) -> list[int]:
-    """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
+    """Return frames to picture: the worst of the focus first, then others evenly spread."""
     rows = result.rows
     scored_frames = {*rows["frame"]}
     there = [number for number in result.pictured if number in scored_frames]
@@ -177,11 +181,5 @@ def _choose_frames(result: DriveResult, count: int) -> list[int]:
         ]
         return list(dict.fromkeys([*doubtful, *spread]))[:count]
     masks = finals(only(rows, variant=focus))
-    masks = masks[masks["frame"].isin(pictured)]
-    worst = tables.worst(masks, count)["frame"].tolist()
-    best = tables.worst(masks, len(masks), apart_ns=0)["frame"].tolist()[::-1]
-    turns: list[int] = []
-    for place in range(count):
-        turns += worst[2 * place : 2 * place + 2]
-        turns += [*best[place : place + 1], *spread[place : place + 1]]
-    return list(dict.fromkeys([*turns, *pictured]))[:count]
+    worst = tables.worst(masks[masks["frame"].isin(pictured)], count)["frame"].tolist()
+    return list(dict.fromkeys([*worst, *spread]))[:count]

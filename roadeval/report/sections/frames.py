@@ -136,7 +136,7 @@ SCRIPT_WORDS: Final = (
     "rates of a threshold",
 )
 """Captions that the script of a page fills in."""
-LARGE_ON_PAGE: Final = 640
+LARGE_ON_PAGE: Final = 520
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
@@ -157,11 +157,13 @@ class ThresholdSlider:
     """TP, TN, FP and FN of the stage's masks in the run."""
     levels: Sums
     """``(2, 256)``: labelled pixels of the drive by level, non-road and road."""
+    reached: bool = False
+    """Whether road reaches the threshold, as in masks from elsewhere; else road exceeds it."""
 
     def as_json(self) -> dict[str, Any]:
         """Return all that the script needs."""
         other, road = self.levels.tolist()
-        words = {"stage": self.stage, "now": self.now, "line": self.line}
+        words = {n: getattr(self, n) for n in ("stage", "now", "line", "reached")}
         return {**words, "counts": [*self.counts], "other": other, "road": road}
 
 

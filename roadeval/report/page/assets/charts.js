@@ -21,11 +21,11 @@ function nearest(numbers, value) {
   return Math.abs(numbers[low] - value) <= Math.abs(numbers[high] - value) ? low : high;
 }
 
-/** About so many round numbers in a range. */
-function roundNumbers(low, high, count) {
+/** About so many round numbers in a range, at least so far from each other. */
+function roundNumbers(low, high, count, least = 1) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = Math.max(1, power * [1, 2, 5, 10].find((digit) => digit * power >= rough));
+  const step = Math.max(least, power * [1, 2, 5, 10].find((digit) => digit * power >= rough));
   const numbers = [];
   for (let number = Math.ceil(low / step) * step; number <= high; number += step) numbers.push(number);
   return numbers;
@@ -212,10 +212,13 @@ class ChartView {
   show(low, high) {
     [this.low, this.high] = [low, high];
     this.driveButton.hidden = low === range.drive[0] && high === range.drive[1];
+    const [left, width] = [this.share(low), this.share(high) - this.share(low)];
+    const [top, height] = this.fitValues();
     for (const point of this.element.querySelectorAll(".points > g > svg")) {
-      point.setAttribute("x", `${(100 * (Number(point.dataset.x) - this.share(low))) / (this.share(high) - this.share(low))}%`);
+      point.setAttribute("x", `${(100 * (Number(point.dataset.x) - left)) / width}%`);
+      point.setAttribute("y", `${(100 * (Number(point.dataset.y) - top)) / height}%`);
     }
-    this.area.setAttribute("viewBox", `${this.share(low)} 0 ${this.share(high) - this.share(low)} 100`);
+    this.area.setAttribute("viewBox", `${left} ${top} ${width} ${height}`);
     const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
     this.element.querySelector(".xs").replaceChildren(
       ...ticks.map((tick) => {
@@ -226,6 +229,29 @@ class ChartView {
         return text;
       }),
     );
+  }
+
+  /** Fit the axis of values to what is shown; returned are the top of the view and its height in percent. */
+  fitValues() {
+    const { y: [first, last], series, frames } = this.values;
+    const isWhole = this.low === this.values.x[0] && this.high === this.values.x[1];
+    const shown = this.shownSeries();
+    if (!frames || this.element.classList.contains("low") || (isWhole && shown.length === series.length)) return this.scale(first, last);
+    const inside = shown.flatMap(({ x, y }) => y.filter((value, place) => value !== null && x[place] >= this.low && x[place] <= this.high));
+    if (!inside.length) return this.scale(first, last);
+    const room = Math.max(0.1, (Math.max(...inside) - Math.min(...inside)) * 0.08);
+    return this.scale(first < 0 ? Math.min(...inside) - room : first, Math.min(last, Math.max(...inside) + room));
+  }
+
+  scale(bottom, top) {
+    const [first, last] = this.values.y;
+    const texts = roundNumbers(bottom, top, 5, 0).map((tick) => {
+      const text = svg("text", { x: "100%", y: `${(100 * (top - tick)) / (top - bottom)}%` });
+      text.textContent = `${Number(tick.toFixed(6))}`.replace("-", "\u2212");
+      return text;
+    });
+    if (!this.element.classList.contains("low")) this.element.querySelector(".ys").replaceChildren(...texts);
+    return [(100 * (last - top)) / (last - first), (100 * (top - bottom)) / (last - first)];
   }
 
   mark(frame) {

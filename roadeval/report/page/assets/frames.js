@@ -167,6 +167,7 @@ class Browser {
   chosen(isNew = true) {
     const others = this.data.variants.filter((name) => name !== choice.focus && name !== "blind");
     this.stage?.prefer([choice.focus, choice.beside || others[0]]);
+    for (const view of along) view.show(view.low, view.high);
     this.filter();
     this.judge();
     this.setLevel(this.film?.levels[choice.focus]);
@@ -258,7 +259,7 @@ class Browser {
     const moved = [above(slider.road), below(slider.other), above(slider.other), below(slider.road)];
     const counts = level === undefined ? slider.counts : moved;
     const rates = Object.fromEntries(["ERR", "FPR", "FNR"].map((rate) => [rate, percent(RATES[rate](counts))]));
-    const threshold = level === undefined ? slider.now : (code / 65535).toFixed(5);
+    const threshold = level === undefined ? slider.now : ((code + (slider.reached ? 0.5 : 0)) / 65535).toFixed(5);
     const [label, input, note, line] = ["label", "input", "p", "code"].map((name) => this.thresholdBox.querySelector(name));
     const stage = slider.stage === choice.focus ? "" : ` (${slider.stage})`;
     label.textContent = `Threshold of ${choice.focus}${stage}: ${threshold}`;
