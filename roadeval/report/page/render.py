@@ -42,6 +42,8 @@ _SCRIPTS: Final = (
     *("tables.js", "choice.js", "charts.js", "places.js", "rates.js", "film.js", "pictures.js"),
     *("frames.js", "start.js"),
 )
+_SETTING: Final = re.compile(r"`([a-z_]+\.[a-z_.]+|[a-z_]+ = [^`]+)`")
+"""A setting, or a line of a configuration, between backticks."""
 _MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
@@ -124,16 +126,9 @@ def _environment() -> Any:
         trim_blocks=True,
         finalize=lambda value: visible(value) if type(value) is str else value,
     )
-    environment.filters["coded"] = _coded
+    environment.filters["parts"] = _SETTING.split
     environment.filters["tojson_text"] = lambda value: json.dumps(value, separators=(",", ":"))
     return environment
-
-
-def _coded(text: str) -> Any:
-    """Return a text as markup, with names of settings between backticks as code."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(visible(text)))))
 
 
 def _source(image: ImageFile | bytes) -> str:

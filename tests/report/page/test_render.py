@@ -84,7 +84,7 @@ class Reader(HTMLParser):
 
 
 def test_names_of_settings_are_code_and_nothing_else_is_markup():
-    text = "set `labels.road`, not `<b>`"
+    text = "set `labels.road`, write `threshold = 0.5`, not `<b>`"
     blocks = Text(text), BulletList("", [text]), Table(["a"], [[text]])
     parts = Reader(rendered(*blocks)).elements
     assert [tag for tag, _ in parts].count("code") == 6

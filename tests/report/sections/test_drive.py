@@ -159,14 +159,14 @@ def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is
     assert caption("no command") in [block.text for block in blocks if isinstance(block, Text)]
 
 
-def test_outcomes_are_at_most_640_pixels_across_and_layers_300():
+def test_outcomes_are_at_most_520_pixels_across_and_layers_300():
     image, mask = np.zeros((4, 700, 3), np.uint8), np.zeros((4, 700), np.uint8)
     outcome, layer = (LayerImage(title, image, ERRORS, mask) for title in ("errors", "svm"))
     frame = NotableFrame(
         7, 0, "filtered", {"filtered": rates(0.4)}, images=[outcome], layers=[[layer]]
     )
     found = strip(frame, ["filtered"])
-    assert [[across(each) for each in row] for row in found.rows] == [[640], [300]]
+    assert [[across(each) for each in row] for row in found.rows] == [[520], [300]]
 
 
 def across(picture):
