@@ -40,13 +40,19 @@ def results() -> Console:
     return _terminal(cast("IO[str]", _TrimmedStream(sys.stdout)))
 
 
+def from_here(path: Path) -> Path:
+    """Return a path as it can be typed here: relative if it lies in the current folder."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
 def show_next(out: Console, *commands: str) -> None:
     """Print the commands to type next; each begins with a program as it can be called here."""
     for command in commands:
         name, _, rest = command.partition(" ")
         beside = Path(sys.executable).with_name(name)
         if shutil.which(name) is None and beside.exists():
-            name = os.path.relpath(beside) if beside.is_relative_to(Path.cwd()) else str(beside)
+            name = str(from_here(beside))
         out.print(f"next       {name} {rest}", soft_wrap=True)
 
 

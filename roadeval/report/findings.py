@@ -41,8 +41,6 @@ class NotableFrame:
     """The variant that fails or changes, in a row of a table the focus."""
     rates: Mapping[str, Mapping[str, float]]
     """Rates of each variant's final mask, as in short tables; without truth its signs of doubt."""
-    parts: Mapping[str, float] = field(default_factory=dict)
-    """The parts of the ERR of ``variant``, by stage, see `roadeval.evaluation.tables.causes`."""
     change: float | None = None
     """The filter's effect on ERR, or None."""
     notes: Sequence[str] = ()

@@ -11,7 +11,6 @@ from roadeval.data.words import counted, interval, number, percent
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.tables import FILTER
 from roadeval.results.facts import FrameAccount
 from roadeval.runtime.sentence import Sentence
 
@@ -138,24 +137,6 @@ def describe_overconfidence(curves: Mapping[str, Mapping[str, Mapping[str, Any]]
                 f"{variant} is over-confident: by its probabilities {percent(stated, 1)} % of the "
                 f"pixels are wrong, and {percent(wrong, 1)} % are."
             )
-
-
-def step_by_step(parts: Mapping[str, float]) -> str:
-    """Return how an error rate comes about, as a clause.
-
-    ``parts`` are in percent: the error of the first mask, and the addition of each further step.
-
-    >>> step_by_step({"svm": 15.0, "filter": -1.2})
-    'svm without the filter leaves 15.0 % wrong, the filter removes 1.2 points'
-    """
-    (first, error), *rest = parts.items()
-    without = " without the filter" if FILTER in parts else ""
-    steps = (
-        f"{'the ' * (name == FILTER)}{name} {verb} {abs(cost):.1f} points"
-        for name, cost in rest
-        for verb in ["adds" if cost >= 0 else "removes"]
-    )
-    return ", ".join([f"{first}{without} leaves {error:.1f} % wrong", *steps])
 
 
 def without_filter(notes: Iterable[str]) -> list[str]:

@@ -300,6 +300,11 @@ def claim(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
         os.close(file)
 
 
+def is_claimed(path: Path) -> bool:
+    """Return whether a run claims a file, or was killed while it did."""
+    return path.with_name(f".{path.name}.lock").exists()
+
+
 def open_locked(name: Path, *, wait: bool) -> tuple[int, bool]:
     """Open and lock a file; return it, and whether there are locks."""
     # A link in a folder from elsewhere is not followed: its target would be overwritten.

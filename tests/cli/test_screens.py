@@ -80,7 +80,7 @@ UNLABELLED = UnlabelledFacts(39, "filtered", None, [], {})
 @pytest.mark.parametrize(
     ("parts", "step"),
     [
-        ({"unlabelled": UNLABELLED}, "pick out.rrd -n 20 -o labels"),
+        ({"unlabelled": UNLABELLED}, "pick out.rrd -n 20 -o to_label"),
         (
             {"labelled": 1, "totals": {"filtered": a_mask(), "a": a_mask(), "b": a_mask()}},
             "compare out.rrd --variant b --variant a",

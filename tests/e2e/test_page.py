@@ -307,7 +307,6 @@ def test_a_click_on_a_ribbon_shows_its_frame_and_nothing_jumps(tab):
     assert tab.evaluate("scrollY") == before
     ribbon.focus()
     tab.keyboard.press("ArrowRight")
-    tab.keyboard.press("Enter")
     assert frame(tab) == number + 1
 
 

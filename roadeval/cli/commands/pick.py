@@ -48,7 +48,7 @@ def pick(
 ) -> int:
     """Pick frames of a log without truth to label.
 
-        roadeval pick drive.mcap -n 20 -o labels
+        roadeval pick drive.mcap -n 20 -o to_label
 
     Half of them are drawn at random along the drive; from these 'replay --truth FOLDER' estimates
     the rates of the whole drive, with an interval. The others are the most uncertain ones, apart
@@ -79,7 +79,8 @@ def pick(
         console.say(f"{drive.folder}: {added} to label: {drawn}{uncertain}")
     if drives and not quiet:
         out = console.results()
-        out.print(f"Correct {drives[0].folder}/proposals, and put the results into labels/.")
+        folder = drives[0].folder
+        out.print(f"Correct {folder}/proposals, and put the results into {folder}/labels.")
         console.show_next(out, _next_command(drives, output))
     messages.warn_of_missing_loops()
     return ExitCode.DONE

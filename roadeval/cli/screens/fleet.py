@@ -50,8 +50,9 @@ def show(outcome: FleetOutcome, out: Console) -> None:
             out,
         )
         out.print()
-    out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
-    folder = quote(str(outcome.folder))
+    folder = str(console.from_here(outcome.folder))
+    out.print(f"results    {folder}{os.sep}", soft_wrap=True)
+    folder = quote(folder)
     page = f"roadeval report {folder} -o {quote(f'{outcome.folder.name}.html')}"
     console.show_next(out, page, *([f"roadeval inspect {folder} --list"] if facts.totals else []))
 

@@ -123,7 +123,7 @@ def _next_step(outcome: Outcome, place: Path) -> Iterator[str]:
     brought = [name for name in facts.finals if name not in (FILTERED, UNFILTERED, BASELINE)]
     masks = [*brought[:2], *(name for name in (FILTERED, UNFILTERED) if name in facts.finals)][:2]
     if facts.unlabelled and not facts.frames.labelled:
-        yield f"roadeval pick {path if outcome.recording else log} -n 20 -o labels"
+        yield f"roadeval pick {path if outcome.recording else log} -n 20 -o to_label"
     elif not facts.frames.labelled and facts.log is not None:
         yield f"roadeval replay {log} --truth LABELS"
     elif brought and len(masks) > 1:

@@ -87,9 +87,6 @@ class FramePicker:
         self._all = values_of(result.rows, "variant")
         self._focus = result.facts.focus
         self._scored = frozenset(result.rows["frame"])
-        self._parts: dict[Any, Any] = {}
-        if self._focus:
-            self._parts = tables.causes(result.rows, self._focus).to_dict("index")
 
     def examples(self, numbers: Sequence[int]) -> Iterator[ExampleFrame]:
         """Yield frames for figure 2."""
@@ -179,7 +176,6 @@ class FramePicker:
         masks = only(self._finals, frame=frame).set_index("variant")
         return NotableFrame(
             *(frame, stamp_ns, variant, dict[Any, Any](masks[[*SHORT]].to_dict("index"))),
-            parts=self._parts.get(frame, {}) if variant == self._focus else {},
             change=change,
             notes=result.notes(frame, variant),
             images=[*self._outcomes_of(seen, frame)] if seen else [],

@@ -38,9 +38,9 @@ from roadeval.jobs.run.fleet_work import (
 )
 from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member
-from roadeval.results.fleet import FleetWriter
+from roadeval.results.fleet import FleetWriter, made_path
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.files import AnyPath, Paths, list_paths, reading, sha256_of
+from roadeval.runtime.files import AnyPath, Paths, is_claimed, list_paths, reading, sha256_of
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
@@ -177,7 +177,9 @@ class FleetRun:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
         waiting = []
         for task in tasks:
-            made = find_valid(task) if task.entry.path is not None else None
+            # A worker waits for a run that claims it, or clears away what a killed one left.
+            claimed = is_claimed(made_path(self.folder, task.entry.id))
+            made = None if task.entry.path is None or claimed else find_valid(task)
             if made is None:
                 waiting.append(task)
             else:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from roadeval.data import ERRORS
 from roadeval.data.arrays import Sums
-from roadeval.data.words import in_percent, listing, number, percent, points, timestamp
+from roadeval.data.words import listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.report.blocks import (
@@ -30,7 +30,6 @@ from roadeval.report.film import Film
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage, jpeg
 from roadeval.report.tables import variant_cell
-from roadeval.results.sentences import step_by_step, without_filter
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -80,9 +79,7 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     stamp, *facts = sentences_about(frame)
     if frame.change is not None:
         facts = [caption("changed by the filter", change=points(frame.change))]
-    elif notes := _notes(frame):
-        facts[-len(notes) :] = [" ".join(notes)]
-    sentences = [Text(sentence, "note") for sentence in (stamp, *facts)]
+    sentences = [Text(sentence, "note") for sentence in (stamp, " ".join(facts)) if sentence]
     title = Text(f"Frame {frame.frame}", "title")
     if frame.rates:
         rates = rates_of(frame, [*findings.finals])
@@ -116,17 +113,9 @@ def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
 
 
 def sentences_about(frame: NotableFrame) -> Iterator[str]:
-    """Yield a frame's stamp, the stages that its error comes from, and its notes."""
+    """Yield a frame's stamp and its notes."""
     yield f"Stamp {timestamp(frame.stamp_ns)}"
-    if len(frame.parts) > 1:
-        parts = {name: in_percent(part) for name, part in frame.parts.items()}
-        yield f"{frame.variant}: {step_by_step(parts)}."
-    yield from _notes(frame)
-
-
-def _notes(frame: NotableFrame) -> list[str]:
-    """Return a frame's notes, without the filter's if the parts of its error tell it."""
-    return without_filter(frame.notes) if len(frame.parts) > 1 else [*frame.notes]
+    yield from frame.notes
 
 
 SCRIPT_WORDS: Final = (

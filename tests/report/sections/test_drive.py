@@ -139,7 +139,6 @@ def test_the_trimap_is_a_curve_over_widths_and_has_a_hole_where_no_pixel_is_near
 def a_frame(number, **changes):
     plain = {
         "rates": {"filtered": rates(0.4, 0.3, 0.2), "unfiltered": rates(0.5, 0.6, 0.7)},
-        "parts": {"svm": 0.1, "filter": 0.2, "post": 0.1},
         "notes": ["A note.", "Another."],
     }
     return NotableFrame(number, 12_345_000_000, "filtered", **plain | changes)

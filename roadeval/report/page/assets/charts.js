@@ -116,6 +116,7 @@ class ChartView {
 
   key(event, onFrame) {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (step && this.values.frames && this.element.classList.contains("low")) return; // The page goes to the next frame.
     const numbers = this.numbers();
     const place = this.pointed === undefined ? 0 : nearest(numbers, this.pointed);
     if (step) {
