@@ -272,7 +272,7 @@ def _next_step(
         lines = best.get("lines") or f"threshold = {best['threshold']:.2g}"
         setting = "`, `".join(lines.splitlines())
         yield f"Set `{setting}`: then {in_percent(best[TESTED]):.{digits}f} % are wrong."
-    elif focus in (FILTERED, UNFILTERED) and ROBUST not in rates and defined(own) and own >= WEAK:
+    elif {*rates} <= {FILTERED, UNFILTERED, BASELINE} and defined(own) and own >= WEAK:
         yield "Next: try --variant robust."
 
 

@@ -148,7 +148,7 @@ CASES = {
         "filtered: 15.4 % of the pixels are wrong (91 frames). It misses 30.8 % of the road and "
         "calls 7.7 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
         "than blind, which ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
-        "than without the filter. Best here is mine: 1.9 %. Next: try --variant robust.",
+        "than without the filter. Best here is mine: 1.9 %.",
     ),
     "a threshold is better, and another variant": (
         (
@@ -226,7 +226,7 @@ def test_the_verdict_on_a_chosen_focus_speaks_of_it_and_its_own_differences():
     assert verdict(totals, effects, focus="unfiltered") == (
         "unfiltered: 12.0 % of the pixels are wrong (91 frames). It misses 24.0 % of the road and "
         "calls 6.0 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
-        "than blind, which ignores the image. Best here is mine: 1.9 %. Next: try --variant robust."
+        "than blind, which ignores the image. Best here is mine: 1.9 %."
     )
 
 
