@@ -132,6 +132,7 @@ def _notes(frame: NotableFrame) -> list[str]:
 SCRIPT_WORDS: Final = (
     "verdict of a range",
     "error of a range",
+    "rates of a range",
     "worst frame",
     "rates of a threshold",
 )
