@@ -74,8 +74,8 @@ def make_film(
     """
     first = read(frames[0])[CAMERA]
     most = next((width for count, width in _WIDTHS.items() if len(panels) <= count), _NARROW)
-    width = min(first.shape[1], most) // 2 * 2
-    height = round(first.shape[0] * width / first.shape[1] / 2) * 2
+    width = max(min(first.shape[1], most) // 2 * 2, 2)
+    height = max(round(first.shape[0] * width / first.shape[1] / 2) * 2, 2)
     columns = math.ceil(math.sqrt(len(panels)))
 
     def mosaic(frame: int) -> Plane:

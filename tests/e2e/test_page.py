@@ -275,6 +275,23 @@ def test_a_part_of_the_drive_narrows_tables_charts_and_the_verdict(table, demo, 
     assert "range" not in tab.url
 
 
+def test_a_part_may_be_dragged_over_the_edge_of_a_chart(tab):
+    drag(tab, tab.locator(".ribbons .area").first, 0.7, 1.1)
+    low, high = map(int, re.search(r"range=(\d+)-(\d+)", tab.url).groups())
+    assert tab.locator(".verdict").inner_text().startswith(f"Frames {low} to 99 ")
+    assert high >= 99
+    assert "of the chosen part" in tab.locator("table[data-name=rates] caption").inner_text()
+    assert tab.locator(".ribbons .whole:visible").count() == 1
+
+
+@pytest.mark.parametrize("address", ["#%E0%A4%A", "#frame-9999", "#frame-80&range=500-600"])
+def test_an_address_that_names_nothing_shows_the_worst_frame_of_the_drive(drive, watched, address):
+    seen = watched(drive.as_uri() + address)
+    assert seen.complaints == []
+    assert frame(seen.tab) == 80
+    assert seen.tab.locator(".verdict").inner_text().startswith("filtered: 2.8 %")
+
+
 def test_the_focus_changes_verdict_pictures_and_frames_and_stands_in_the_address(
     tab, demo, watched
 ):

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from roadeval.data import (
-    OUTCOMES,
-)
+from roadeval.data import OUTCOMES
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score.thresholds import LEVELS
@@ -105,12 +103,12 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
 
 
 def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> Film | None:
-    """Return the video of a drive, of at most ``room`` bytes; None without pictures.
+    """Return the video of a drive, of at most ``room`` bytes; None without pictures or room.
 
-    A long drive is thinned evenly; frames with pictures of all layers are kept.
+    A long drive is thinned evenly; frames with pictures of all layers are kept if there is room.
     """
     recording = result.recording
-    if recording is None or not result.pictured:
+    if recording is None or not result.pictured or room < FILM_BYTES:
         return None
     scored = {*result.rows["frame"]}
     there = [frame for frame in result.pictured if frame in scored] or [*result.pictured]

@@ -121,6 +121,7 @@ def sentences_about(frame: NotableFrame) -> Iterator[str]:
 SCRIPT_WORDS: Final = (
     "verdict of a range",
     "error of a range",
+    "rates of a range",
     "worst frame",
     "rates of a threshold",
 )

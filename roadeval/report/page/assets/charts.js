@@ -2,7 +2,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const along = []; // The charts along the drive.
-const range = { drive: null, low: 0, high: 0, onChange: [] };
+const range = { drive: null, low: 0, high: 0, frames: null, onChange: [] };
 
 function svg(name, attributes) {
   const made = document.createElementNS(SVG, name);
@@ -98,7 +98,9 @@ class ChartView {
     area.addEventListener("keydown", (event) => this.key(event, onFrame));
     if (!this.values.frames) return;
     area.addEventListener("pointerdown", (event) => {
-      if (event.button === 0) begin = this.at(event);
+      if (event.button !== 0) return;
+      begin = this.at(event);
+      area.setPointerCapture(event.pointerId); // A part may end beside the chart.
     });
     area.addEventListener("pointerup", (event) => {
       const end = this.at(event);
@@ -143,7 +145,8 @@ class ChartView {
 
   at(event) {
     const box = this.area.getBoundingClientRect();
-    return this.low + ((event.clientX - box.left) / box.width) * (this.high - this.low);
+    const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
+    return this.low + share * (this.high - this.low);
   }
 
   snapped(x) {
@@ -212,7 +215,7 @@ class ChartView {
 
   show(low, high) {
     [this.low, this.high] = [low, high];
-    this.driveButton.hidden = low === range.drive[0] && high === range.drive[1];
+    this.driveButton.hidden = !isPart();
     const [left, width] = [this.share(low), this.share(high) - this.share(low)];
     const [top, height] = this.fitValues();
     for (const point of this.element.querySelectorAll(".points > g > svg")) {
@@ -267,12 +270,19 @@ function pointAt(view, x) {
   if (x !== null) view.tell();
 }
 
+/** Whether a part of the drive is chosen. */
+function isPart() {
+  return range.drive && (range.low > range.drive[0] || range.high < range.drive[1]);
+}
+
+/** Choose a part of the drive, unless it has no frame. */
 function zoom(low, high) {
   const least = 3;
   if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
-  [range.low, range.high] = [low, high];
-  for (const view of along) view.show(low, high);
-  for (const listener of range.onChange) listener(low, high);
+  if (range.frames && !range.frames.some((frame) => frame >= low && frame <= high)) return;
+  [range.low, range.high] = [Math.max(low, range.drive[0]), Math.min(high, range.drive[1])];
+  for (const view of along) view.show(range.low, range.high);
+  for (const listener of range.onChange) listener();
 }
 
 function startCharts(onFrame) {

@@ -13,7 +13,7 @@ function isShown(name) {
 
 /** What the address names: a frame or a section, and the choices behind it. */
 function readAddress() {
-  const [place, ...pairs] = decodeURIComponent(location.hash.slice(1)).split("&");
+  const [place, ...pairs] = location.hash.slice(1).split("&");
   const frame = /^frame-(\d+)$/.exec(place);
   return { place, frame: frame ? Number(frame[1]) : null, ...Object.fromEntries(new URLSearchParams(pairs.join("&"))) };
 }

@@ -51,7 +51,7 @@ class Film {
   /** Play until the end, or until a frame. */
   async play(last, onEnd) {
     this.playing = true;
-    await this.video.play();
+    await this.video.play().catch(() => {}); // It was paused before it began.
     const step = () => {
       const place = Math.min(Math.floor(this.video.currentTime * this.fps), this.frames.length - 1);
       if (place !== this.wanted) {

@@ -37,7 +37,8 @@ class Browser {
       });
     }
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
-    range.onChange.push((low, high) => this.narrow(low, high));
+    range.frames = this.data.frames;
+    range.onChange.push(() => this.narrow());
     for (const strip of this.held.values()) strip.hidden = true;
     startChoice(this.data.focus, () => this.chosen());
     this.follow(Boolean(location.hash));
@@ -52,9 +53,9 @@ class Browser {
     choose(names.includes(focus) ? focus : this.data.focus, names.includes(beside) || beside === "-" ? beside : "", () => this.chosen(false));
     const ends = /^(\d+)-(\d+)$/.exec(part ?? "");
     if (range.drive) zoom(...(ends ? ends.slice(1).map(Number) : range.drive));
-    if (threshold) this.setLevel(Number(threshold));
+    this.setLevel(threshold ? Math.min(Math.max(Math.round(threshold) || 1, 1), 255) : undefined);
     const worst = this.data.worst[choice.focus]?.[0] ?? Number(this.element.dataset.first);
-    this.show(frame ?? worst, { scroll: scroll && frame !== null, address: null });
+    this.show(this.place.has(frame) ? frame : worst, { scroll: scroll && frame !== null, address: null });
   }
 
   tools() {
@@ -123,7 +124,7 @@ class Browser {
 
   writeAddress(step = "replaceState") {
     const level = this.film?.levels[choice.focus];
-    const part = range.drive && range.low !== range.drive[0] ? `${Math.ceil(range.low)}-${Math.floor(range.high)}` : "";
+    const part = isPart() ? `${Math.ceil(range.low)}-${Math.floor(range.high)}` : "";
     const focus = choice.focus === this.data.focus ? "" : choice.focus;
     writeAddress(this.frame, { focus, beside: choice.beside, range: part, threshold: level }, step);
   }
@@ -131,7 +132,9 @@ class Browser {
   position() {
     const frames = this.shown();
     const place = frames.indexOf(this.frame);
-    this.where.textContent = `Frame ${this.frame}` + (place < 0 ? "" : ` \u00b7 ${place + 1} of ${frames.length}`);
+    const isFilmed = !this.film || this.film.places.has(this.frame);
+    this.element.classList.toggle("unfilmed", !isFilmed);
+    this.where.textContent = `Frame ${this.frame}${isFilmed ? "" : " (not in the video)"}` + (place < 0 ? "" : ` \u00b7 ${place + 1} of ${frames.length}`);
     this.previous.disabled = !frames.some((number) => number < this.frame);
     this.next.disabled = !frames.some((number) => number > this.frame);
   }
@@ -199,12 +202,11 @@ class Browser {
   /** Say how wrong the focus is, on the whole drive or on the chosen part of it. */
   judge() {
     const { words, counts, frames, verdicts } = this.data;
-    const isNarrow = range.drive && range.low !== range.drive[0];
     const countsIn = (name) => counts[name].filter((frame, place) => frame && isInRange(frames[place]));
     const [inside, ofFocus] = [frames.filter((frame) => isInRange(frame)), counts[choice.focus]];
     const rates = (name) => Object.fromEntries(["ERR", "FNR", "FPR"].map((rate) => [rate, percent(meanRate(rate, countsIn(name)), 1)]));
     this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus]?.replaceAll("`", "") ?? this.verdictOfDrive);
-    if (isNarrow && ofFocus) {
+    if (isPart() && ofFocus) {
       const others = Object.keys(counts).filter((name) => name !== choice.focus && isShown(name));
       const told = others.map((name) => fill(words["error of a range"], { variant: name, ...rates(name) })).join(" ");
       const named = { first: inside[0], last: inside.at(-1), frames: inside.length, variant: choice.focus, others: told };
@@ -224,7 +226,7 @@ class Browser {
       const command = document.querySelector("#summary .links code");
       if (command) command.textContent = this.element.dataset.command.replace("{}", worst);
     }
-    if (this.ratesTable) narrowRates(this.ratesTable, isNarrow ? (name) => counts[name] && countsIn(name) : null);
+    if (this.ratesTable) narrowRates(this.ratesTable, words["rates of a range"], isPart() ? (name) => counts[name] && countsIn(name) : null);
   }
 
   /** A threshold on the focus' probability: the picture, the rates, and the line to write. */
@@ -321,17 +323,19 @@ function isInRange(frame) {
 }
 
 /** Put the rates of some frames into the table of the whole drive, or the drive's own again. */
-function narrowRates(table, countsOf) {
+function narrowRates(table, words, countsOf) {
+  table.caption.dataset.drive ??= table.caption.textContent;
+  table.caption.textContent = countsOf ? words : table.caption.dataset.drive;
   const titles = [...table.tHead.rows[table.tHead.rows.length - 1].cells].map((cell) => cell.textContent.replace(/[^\w ]/g, "").trim());
   table.classList.toggle("narrow", Boolean(countsOf));
   for (const row of table.tBodies[0].rows) {
     const counts = countsOf?.(row.cells[0].textContent);
     for (const [place, cell] of [...row.cells].entries()) {
       if (!place) continue;
-      const words = cell.querySelector("b") ?? cell;
-      cell.dataset.drive ??= words.textContent;
+      const text = cell.querySelector("b") ?? cell;
+      cell.dataset.drive ??= text.textContent;
       const rate = counts ? rateOfColumn(titles[place], counts) : undefined;
-      words.textContent = !countsOf ? cell.dataset.drive : rate === undefined ? "\u2013" : percent(rate);
+      text.textContent = !countsOf ? cell.dataset.drive : rate === undefined ? "\u2013" : percent(rate);
     }
   }
 }
