@@ -129,6 +129,8 @@ def _numbers(
         for rate, value in tally.rates.items():
             if rate in rates and not math.isnan(value):
                 yield f"/metrics/{mask}/{rate}", (value,)
+                if rate in SHORT:
+                    yield f"{at.PERCENT}/{mask}/{rate}", (100 * value,)
         yield f"/counts/{mask}", (*tally.counts, tally.counts.n)
     for variant in result.variants:
         for stage in variant.stages:

@@ -49,8 +49,6 @@ _PICTURE, _HEADER = 100, 50
 """Shares of a row's width: each picture, and at least its header."""
 _ROWS: Final = 2
 """Most variants that have a row: with more every picture would be too small."""
-_UNIT: Final = "0.1 is 10 %"
-"""The unit of curves: Rerun 0.41 shows numbers as they are logged, and rates are fractions."""
 _ABREAST: Final = 3
 """Cameras side by side."""
 _OUTCOMES: Final = 4
@@ -117,8 +115,8 @@ def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
         _add_prefix(prefix, [view])
         pictures.append(view)
         variants = layout.shown[:_ROWS] if layout.has_truth else ()
-        paths += [f"{prefix}/metrics/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
-    curves = [plot(f"{TESTED} by camera ({_UNIT})", paths)] if paths else []
+        paths += [f"{prefix}{at.PERCENT}/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
+    curves = [plot(f"{TESTED} by camera, %", paths)] if paths else []
     below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
     grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
     return rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras")
@@ -135,8 +133,8 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
         rates = [rate for rate in SHORT if rate in layout.rates]
         plots = []
         for stage, rate in product(dict.fromkeys(stage for _, stage in masks), rates):
-            paths = [f"/metrics/{name}/{stage}/{rate}" for name, other in masks if other == stage]
-            plots.append(plot(f"{rate} of {stage}", paths))
+            paths = [f"{at.PERCENT}/{v}/{stage}/{rate}" for v, other in masks if other == stage]
+            plots.append(plot(f"{rate} of {stage}, %", paths))
         tabs.append(rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage"))
         plots = [plot(f"{v}: pixels of {s}", [f"/counts/{v}/{s}"]) for v, s in masks]
         columns = max(len(variant.stages) for variant in layout.variants)
@@ -253,8 +251,8 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
     finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
     return [
         plot(
-            f"{rate}: {SHORT[rate].in_words} ({_UNIT})",
-            [f"/metrics/{final}/{rate}" for final in finals],
+            f"{rate}, %: {SHORT[rate].in_words}",
+            [f"{at.PERCENT}/{final}/{rate}" for final in finals],
         )
         for rate in SHORT
         if rate in layout.rates
@@ -493,6 +491,8 @@ def _lines(layout: Layout, camera: str) -> StaticData:
         for rate in layout.rates:
             line = _line(camera + variant, variants[variant])
             yield f"/metrics/{variant}/{stage}/{rate}", [line]
+            if rate in SHORT:
+                yield f"{at.PERCENT}/{variant}/{stage}/{rate}", [line]
         yield f"/counts/{variant}/{stage}", [counts]
 
 
