@@ -47,7 +47,8 @@ class Metric:
     shown: Shown = Shown.EVERYWHERE
     """Places where people see it; a mirror of another, as ``TPR = 1 - FNR``, is in files only."""
     tabled: bool = True
-    """Whether it is a column of the tables; if not, it is computed from sums only."""
+    """Whether it is a column of the tables; if not, only totals have it, and results that were made
+    before it was added can still be read."""
 
     @property
     def in_words(self) -> str:

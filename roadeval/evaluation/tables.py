@@ -112,13 +112,13 @@ def totals(frames: pd.DataFrame, by: Sequence[str] = MASK) -> pd.DataFrame:
 def as_trees(sums: pd.DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
     """Return `totals` of masks by variant and stage, as ``summary.json`` has them."""
     rates = [*METRICS, *(f"pooled_{name}" for name in METRICS)]
-    overlap = [*metrics.OVERLAP, *(f"pooled_{name}" for name in metrics.OVERLAP)]
+    untabled = [*metrics.UNTABLED, *(f"pooled_{name}" for name in metrics.UNTABLED)]
     trees: dict[str, dict[str, dict[str, Any]]] = {}
     rows: dict[Any, dict[Any, Any]] = sums.to_dict("index")
     for (variant, stage), row in rows.items():
         undefined = {name: int(row[f"undefined_{name}"]) for name in metrics.ALL}
         first = {name: row[name] for name in ("frames", *COUNTS, "N", *rates)}
-        last = {name: row[name] for name in overlap}
+        last = {name: row[name] for name in untabled}
         trees.setdefault(variant, {})[stage] = {**first, "undefined": undefined, **last}
     return trees
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Final
 
 from roadeval.data.words import DASH, MINUS, defined, listing, number, percent, points, short_names
-from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT, SHORT_OVERLAP, TESTED
+from roadeval.evaluation.metrics import FULL, METRICS, SHORT, SHORT_UNTABLED, TESTED, UNTABLED
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.captions import caption
 from roadeval.report.chart import looks
@@ -45,7 +45,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
     shown = {name.replace("_", " "): (name, metric) for name, metric in FULL.items()}
     shown[f"pooled {TESTED}"] = f"pooled_{TESTED}", METRICS[TESTED]
     if not of_fleet:
-        shown |= {name: (f"pooled_{name}", metric) for name, metric in OVERLAP.items()}
+        shown |= {name: (f"pooled_{name}", metric) for name, metric in UNTABLED.items()}
     for title, (rate, metric) in shown.items():
         values = [total.get(rate) for total in finals.values()]
         columns[title] = best_bold(values, higher=metric.higher_is_better)
@@ -53,7 +53,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         sentences = [caption("rates of a fleet")]
     else:
         frames = counts[0] if alike else "the evaluated"
-        sentences = [caption("rates", frames=frames, overlap=listing([*OVERLAP]))]
+        sentences = [caption("rates", frames=frames, untabled=listing([*UNTABLED]))]
         if widths := {measured["width"] for measured in facts.beyond.values()}:
             for name in ("boundary_F", "boundary_IoU"):
                 values = [facts.beyond.get(variant, {}).get(name) for variant in finals]
@@ -85,7 +85,7 @@ def stages_table(
                     stage,
                     number(total["frames"]),
                     *(percent(total.get(n)) for n in FULL),
-                    *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_OVERLAP)),
+                    *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_UNTABLED)),
                 ]
             )
             if changes:
@@ -93,7 +93,7 @@ def stages_table(
     changed = ["repaired", "spoiled"] if changes else []
     meanings = "; ".join(f"{name}: {metric.in_words}" for name, metric in SHORT.items())
     return Table(
-        ["variant", "stage", "frames", *FULL, "pooled ERR", *SHORT_OVERLAP, *changed],
+        ["variant", "stage", "frames", *FULL, "pooled ERR", *SHORT_UNTABLED, *changed],
         rows,
         text_columns=(0, 1),
         breaks=breaks[1:],

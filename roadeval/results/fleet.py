@@ -40,7 +40,14 @@ from roadeval.results.facts import (
 )
 from roadeval.results.folder import ResultsFolder
 from roadeval.results.over_drives import summarise
-from roadeval.results.rows import Key, beyond_masks, drive_row, effect_rows, scores, table_of
+from roadeval.results.rows import (
+    Key,
+    beyond_masks,
+    drive_row,
+    effect_rows,
+    table_of,
+    table_of_scores,
+)
 from roadeval.results.schema import FAILED, OF_DRIVES, TABLES, TAG
 from roadeval.results.tables import (
     AGAIN,
@@ -314,7 +321,7 @@ def cache(folder: Path, drive: str) -> None:
     rows = {
         "frames": frames,
         "regions": tables.finals(regions),
-        "scores": scores(frames, regions, beyond_masks(results.facts, key)),
+        "scores": table_of_scores(frames, regions, beyond_masks(results.facts, key)),
         "worst": _frames_with_pictures(
             folder, drive, only(frames, final=True, variant=results.facts.focus)
         ).assign(rank=0),

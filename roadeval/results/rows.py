@@ -154,7 +154,7 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
     }
 
 
-def scores(
+def table_of_scores(
     frames: pd.DataFrame, regions: pd.DataFrame, beyond: Sequence[Mapping[str, Any]]
 ) -> pd.DataFrame:
     """Return the table ``scores`` of any number of drives: each mask on all pixels, and by region.
@@ -177,7 +177,7 @@ def scores(
 
 
 def beyond_masks(facts: Facts, key: Key) -> list[dict[str, Any]]:
-    """Return the numbers of each final mask of a drive beyond its counts, for `scores`."""
+    """Return the numbers of each final mask of a drive beyond its counts, for `table_of_scores`."""
     names = ("boundary_F", "boundary_IoU", "flicker", "truth_flicker")
     rows = []
     for variant, mask in facts.beyond.items():

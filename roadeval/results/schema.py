@@ -58,7 +58,8 @@ class Column(NamedTuple):
 
 
 LATER: Final = ("truth",)
-"""Columns that the first results of this format lack; they are read as 0, for unknown."""
+"""Columns of counts that the first CSV files of this format lack; they are read as 0, for unknown.
+Without any other column a file is damaged."""
 
 
 class TableSchema(NamedTuple):

@@ -34,8 +34,8 @@ COLUMNS: Final = 1_000
 WORDS: Final = 1_000
 """Different words in a column of a drive's table: variants, stages, regions."""
 FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 3}
-"""Format of a fleet's folder and its tables; a column that changes its meaning raises the version.
-"""
+"""Format of a fleet's folder and its tables. A column that changes its meaning raises the version;
+for one that is added the fleet's command, run again, makes the tables anew."""
 AGAIN: Final = "run the fleet's command again"
 _ANEW: Final = "make the results again with roadeval replay"
 

@@ -20,7 +20,7 @@ from roadeval.evaluation import regions
 from roadeval.evaluation.metric import Metric
 from roadeval.evaluation.metrics import (
     ALL,
-    OVERLAP,
+    UNTABLED,
     of,
     table,
 )
@@ -110,7 +110,7 @@ def test_a_rate_without_a_denominator_is_undefined(counts: Counts, undefined: se
 
 def test_overlap_is_undefined_where_there_is_nothing_to_overlap() -> None:
     nothing = Counts(tn=9)
-    assert all(math.isnan(metric.function(nothing)) for metric in OVERLAP.values())
+    assert all(math.isnan(metric.function(nothing)) for metric in UNTABLED.values())
 
 
 @settings(max_examples=40)

@@ -11,7 +11,7 @@ from roadeval.evaluation import metrics
 from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, windows
-from roadeval.results.rows import Key, csv_lines, scores, sum_rows
+from roadeval.results.rows import Key, csv_lines, sum_rows, table_of_scores
 from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES, documentation
 from roadeval.results.tables import ResultsError, TableFacts, read_table
 from tests.evaluation.making import a_table, table_of
@@ -146,7 +146,7 @@ def test_each_mask_has_a_row_of_its_own_on_all_pixels_and_one_of_each_region():
     frames = concatenate([a_table(masks), a_table({("net", "svm"): [50]}, drive="road")])
     regions = table_of("regions", [of_region(0, 2), of_region(1, -1), of_region(0, 1, "far")])
     known = {"variant": "net", "boundary_f": 0.7, "drive": "street", "camera": KEY.camera}
-    rows = scores(frames, regions, [known])
+    rows = table_of_scores(frames, regions, [known])
     assert [*rows] == [*TABLES["scores"].names]
     shown = rows[["drive", "stage", "region", "final", "frames", "ERR"]].to_numpy().tolist()
     assert shown == [
@@ -162,7 +162,7 @@ def test_each_mask_has_a_row_of_its_own_on_all_pixels_and_one_of_each_region():
 
 
 def test_nothing_scored_has_no_scores():
-    rows = scores(NOTHING, table_of("regions", []), [])
+    rows = table_of_scores(NOTHING, table_of("regions", []), [])
     assert rows.empty
     assert [*rows] == [*TABLES["scores"].names]
 

@@ -436,8 +436,8 @@ def _rates(drives: pd.DataFrame, end: str = "") -> dict[str, float]:
     """Return the means over drives of a mask's rates, and the metrics of all pixels together."""
     means = _means(drives, [f"{name}{end}" for name in METRICS])
     sums = drives[[f"{name}{end}" for name in COUNTS]].sum().to_frame().T
-    overlap = rates_of(sums, metrics.OVERLAP, end=end)
-    pooled = overlap.join(rates_of(sums, prefix="pooled_", end=end)).iloc[0]
+    untabled = rates_of(sums, metrics.UNTABLED, end=end)
+    pooled = untabled.join(rates_of(sums, prefix="pooled_", end=end)).iloc[0]
     rest = {str(name).removesuffix(end): float(value) for name, value in pooled.items()}
     return dict(zip(METRICS, means, strict=True)) | rest
 

@@ -38,7 +38,7 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import ComparedResult, Comparison, MaskChange
-from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, OVERLAP
+from roadeval.evaluation.metrics import ALL, COMPARED, METRICS, UNTABLED
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.runtime.sentence import Sentence
 
@@ -48,7 +48,7 @@ OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     "<": operator.lt,
     "<=": operator.le,
 }
-QUANTITIES: Final = (*METRICS, *(f"pooled_{name}" for name in ALL), *OVERLAP)
+QUANTITIES: Final = (*METRICS, *(f"pooled_{name}" for name in ALL), *UNTABLED)
 _GRAMMAR: Final = re.compile(
     r"\s*(?P<stage>[\w-]+)\.(?P<variant>[\w-]+)\.(?P<rate>\w+)"
     r"\s*(?P<operator>>=|<=|>|<)"

@@ -1,7 +1,7 @@
 """The metrics.
 
-To add one, add a file with ``METRICS``: each becomes a column of the tables, a series of the
-recording, and a rate of every screen, graph and report, as its attributes say.
+To add one, add a file with ``METRICS``: each becomes a rate of screens, graphs and reports, and if
+it is tabled a column of the tables and a series of the recording, as its attributes say.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}
 TESTED: Final = "ERR"
 """The rate whose differences are findings. Differences of final masks against one base are a
 family, and corrected for their number; other rates and stages explain a finding."""
-OVERLAP: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}
-"""Metrics beyond the paper's, which are computed from sums only."""
+UNTABLED: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}
+"""Metrics beyond the paper's, which are computed with the totals."""
 
 
 def _shown(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
@@ -43,7 +43,7 @@ SHORT: Final = _shown(METRICS, Shown.EVERYWHERE)
 """The rates of short tables, lists, graphs and charts."""
 FULL: Final = _shown(METRICS, Shown.IN_FULL)
 """The rates of tables that show all of a mask."""
-SHORT_OVERLAP: Final = _shown(OVERLAP, Shown.EVERYWHERE)
+SHORT_UNTABLED: Final = _shown(UNTABLED, Shown.EVERYWHERE)
 """The metrics without a column in tables that are shown beside `SHORT`."""
 COMPARED: Final = tuple(name for name in METRICS if name in FULL)
 """The metrics that have paired differences, in the order of the columns."""

@@ -148,7 +148,7 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     """
     if levels is None or not levels[1].sum():
         cells = Counts(*counts.tolist())
-        rates = {name: metrics.OVERLAP[name].function(cells) for name in ("F1", "precision")}
+        rates = {name: metrics.UNTABLED[name].function(cells) for name in ("F1", "precision")}
         return {**rates, "recall": metrics.METRICS["TPR"].function(cells)}
     # Road are the cells of at least the probability k / 255.
     negative, positive = levels[:, ::-1].cumsum(axis=1)[:, ::-1]

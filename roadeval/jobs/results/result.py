@@ -37,8 +37,8 @@ from roadeval.results.rows import (
     drive_row,
     effect_rows,
     records,
-    scores,
     table_of,
+    table_of_scores,
 )
 from roadeval.results.verdict import verdict, with_focus
 from roadeval.runtime.text import visible
@@ -199,7 +199,9 @@ class DriveResult:
             case "effects":
                 return table_of(name, effect_rows(self.facts, self.key))
             case "scores":
-                return scores(self.rows, self.table("regions"), beyond_masks(self.facts, self.key))
+                return table_of_scores(
+                    self.rows, self.table("regions"), beyond_masks(self.facts, self.key)
+                )
             case "worst":
                 return table_of(name, ())
         rows = self._tables.table(name)

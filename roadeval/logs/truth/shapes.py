@@ -261,7 +261,8 @@ class LabelFormat:
     ending: str
     """The ending of its files, in lower case."""
     holds: Callable[[Path, Any], bool]
-    """Whether a parsed file is of this format."""
+    """Whether a parsed file is of this format; of formats with one ending the first that says so
+    reads it, in the order of their modules' names."""
     read: Callable[[Path, Any, Size | None], Iterable[DrawnLabel]]
     """Return the label of each image in a parsed file of this format, given the size of the log's
     images. A `LogError` or `BadMessage` describes a label that cannot be used; a KeyError,

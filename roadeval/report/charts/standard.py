@@ -56,7 +56,7 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
 
     def further_rates(windows: pd.DataFrame) -> list[Chart]:
         names = (name for name in SHORT if name not in (TESTED, "FPR", "FNR"))
-        # A metric is undefined everywhere in results that are older than it.
+        # A metric that is undefined in every window has no chart.
         return over_windows(windows, [name for name in names if windows[name].notna().any()])
 
     return (
@@ -70,7 +70,11 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
 def over_windows(
     windows: pd.DataFrame, rates: Sequence[str], by_variant: Mapping[str, Look] | None = None
 ) -> list[Chart]:
-    """Return a chart of each rate: each variant's final mask, window by window."""
+    """Return a chart of each rate: each variant's final mask, window by window.
+
+    ``rates`` are metrics or signs; to draw what is made of one, change its column before, and the
+    titles and units of the charts after.
+    """
     middles = (windows["first_frame"] + windows["last_frame"]) / 2
     return over_frames(windows.assign(frame=middles), rates, by_variant)
 
