@@ -107,6 +107,7 @@ def write_figures(
     name = drive if titled else ""
 
     def draw() -> Iterator[tuple[str, bytes]]:
+        """Yield each figure's name and its SVG."""
         with mpl.rc_context(RC):  # type: ignore[arg-type]
             if examples:
                 yield f"fig2_masks{ending}", as_svg(road_masks(name, examples, width))

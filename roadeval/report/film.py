@@ -79,6 +79,7 @@ def make_film(
     columns = math.ceil(math.sqrt(len(panels)))
 
     def mosaic(frame: int) -> Plane:
+        """Return the panels of a frame in one picture, ``(rows H, columns W, 3)`` uint8 RGB."""
         by_name = read(frame)
         rows = -(-len(panels) // columns)
         picture = np.full((rows * height, columns * width, 3), NO_MASK, np.uint8)
@@ -93,10 +94,14 @@ def make_film(
 
 
 def _fit(panel: Plane, width: int, height: int) -> Plane:
-    """Return a panel in its size; shades have a third axis of one."""
+    """Return a panel in its size; shades have a third axis of one, and none are mixed.
+
+    The mean of road and non-road would be the shade of ignored pixels.
+    """
     import cv2
 
-    fitted = cv2.resize(panel, (width, height), interpolation=cv2.INTER_AREA)
+    method = cv2.INTER_AREA if panel.ndim == 3 else cv2.INTER_NEAREST
+    fitted = cv2.resize(panel, (width, height), interpolation=method)
     return np.asarray(fitted.reshape(height, width, -1), np.uint8)
 
 
