@@ -43,16 +43,18 @@ _WHY: Final = {
 """Words behind a number of frames, by the reasons of `roadeval.results.facts.FrameAccount`."""
 
 
-def account(frames: FrameAccount, windows: int | None = None) -> str:
+def account(frames: FrameAccount, windows: int = 0, size: int = 10) -> str:
     """Return how many frames of a log were evaluated, and why the others were not.
 
+    ``windows`` are the groups of ``size`` frames that they make.
+
     >>> account(FrameAccount(in_log=100, evaluated=90, skipped={"trained on": 10}), 9)
-    '90 of 100 frames were evaluated, in 9 windows. Left out: 10 to train on.'
+    '90 of 100 frames were evaluated, in 9 groups of 10. Left out: 10 to train on.'
     """
     total = frames.evaluated if frames.in_log is None else frames.in_log
     of = "" if frames.evaluated == total else f"{number(frames.evaluated)} of "
     verb = "was" if frames.evaluated == 1 else "were"
-    within = f", in {counted(windows, 'window')}" if windows else ""
+    within = f", in {counted(windows, 'group')} of {size}" if windows else ""
     sentence_on_frames = f"{of}{counted(total, 'frame')} {verb} evaluated{within}."
     why = [f"{number(count)} {_WHY.get(name, name)}" for name, count in frames.skipped.items()]
     return f"{sentence_on_frames} Left out: {', '.join(why)}." if why else sentence_on_frames
