@@ -11,7 +11,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -19,13 +19,23 @@ from typing import Any, Final, Protocol
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
 from roadeval.config.variants import Variant
-from roadeval.data import Calibration, FrameResult, Role, VariantLayout
+from roadeval.data import (
+    Calibration,
+    Frame,
+    FrameResult,
+    Output,
+    Role,
+    StageResult,
+    VariantLayout,
+    VariantResult,
+)
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score.fit import FitCheck
-from roadeval.evaluation.score.frame import BlindPrior
+from roadeval.evaluation.score.frame import BlindPrior, score_finals
 from roadeval.evaluation.score.scoreboard import Scoreboard
+from roadeval.images.disturbing import Disturbance, Light
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.logs.errors import FrameError
@@ -137,6 +147,25 @@ class Run:
     """The camera's name in a rig; elsewhere its topic is its name."""
     failures: Failures = field(default_factory=Failures)
     """The frames on which a stage failed, so far."""
+    failures_disturbed: Failures = field(default_factory=Failures)
+    """The frames that could be evaluated, but not with a disturbance."""
+
+    @cached_property
+    def disturbances(self) -> Mapping[str, Disturbance]:
+        """The disturbances of evaluated frames, by their texts; none without truth."""
+        texts = self.config.frames.disturb if self.selection.truth else ()
+        return {text: Disturbance.parse(text) for text in texts}
+
+    @cached_property
+    def disturbed_variants(self) -> tuple[str, ...]:
+        """The variants that run on disturbed frames: those without masks from elsewhere."""
+        return tuple(v.name for v in self.variants if "given" not in v.pipeline.settings)
+
+    @cached_property
+    def depth(self) -> Light | None:
+        """The metres to the ground at each pixel, if the camera is known."""
+        ground = self.selection.ground_as_read
+        return ground.distances().astype("float32") if ground else None
 
     @property
     def key(self) -> Key:
@@ -159,6 +188,8 @@ class Run:
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
         """Add a frame, in the camera's order; return it with the lines that take that order."""
         doubts = self.board.add(done.result)
+        for failure in done.failures:
+            self.failures_disturbed.add(failure)
         frame, variants = done.result.frame, done.result.variants
         final_masks = [[*v.masks()][-1][1] for v in variants if v.variant not in frame.external]
         self.fit.add(frame, final_masks)
@@ -180,6 +211,7 @@ class Run:
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
+            disturbed={d.name: self.disturbed_variants for d in self.disturbances.values()},
             focus=self.board.unlabelled.focus,
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
@@ -373,6 +405,8 @@ class ProcessedFrame:
     result: FrameResult
     lines: Mapping[str, str]
     encoded: Any
+    failures: Sequence[Failure] = ()
+    """The variants that failed on its disturbed images."""
 
 
 def process(
@@ -455,8 +489,38 @@ def _process(
         if name not in run.chains
     ]
     result = run.board.score(frame, role, tuple(variants))
-    result = replace(result, notes=notes_of(result.tallies))
+    disturbed, failures = _disturb(run, frame) if role is Role.EVALUATED else ({}, [])
+    result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
-    return run, ProcessedFrame(position, result.without_layers(), lines, encoded)
+    return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)
+
+
+def _disturb(run: Run, frame: Frame) -> tuple[dict[str, FrameResult], list[Failure]]:
+    """Run the chains on a frame's disturbed images; return the scored final masks, and failures."""
+    results: dict[str, FrameResult] = {}
+    failures = []
+    plain = replace(frame, payload=b"", media_type=None, shadow_truth=None, external={})
+    for text, disturbance in run.disturbances.items():
+        image = disturbance.of(frame.image, frame.number, run.depth)
+        view, shared = View.of(image, frame.moment), dict[Any, Any]()
+        variants = []
+        for name in run.disturbed_variants:
+            try:
+                stages = [*run.chains[name].run(view, shared)]
+            except StageError as error:
+                where = "".join(traceback.format_exception(error))
+                reason = Sentence("{}: {}", text, error.sentence)
+                failures.append(Failure(frame.number, Role.EVALUATED, name, reason, where))
+                continue
+            last = [stage for stage in stages if stage.output.mask is not None][-1]
+            layers = [a for a in last.output.layers if a.spec.name == last.stage]
+            output = Output(tuple(layers), mask=last.output.mask)
+            variants.append(VariantResult(name, (StageResult(last.stage, output, last.seconds),)))
+        assert frame.truth is not None
+        bare = replace(plain, image=image, truth=None)
+        results[text] = score_finals(
+            FrameResult(bare, Role.EVALUATED, tuple(variants)), frame.truth
+        )
+    return results, failures

@@ -14,8 +14,10 @@ import numpy as np
 
 from roadeval.config.variants import AS_IT_IS
 from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
+from roadeval.data.words import listing
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.fit import LAST_LAG, TRUTH, Finding, FitCheck, Misfit
 from roadeval.evaluation.score.scoreboard import DriveSums, drive_effects
 from roadeval.evaluation.score.unlabelled import Unlabelled
@@ -213,7 +215,10 @@ def _best_thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def join_cameras(
-    frames: pd.DataFrame, cameras: Mapping[str, Facts], stated: dict[str, TableFacts]
+    frames: pd.DataFrame,
+    disturbed: pd.DataFrame,
+    cameras: Mapping[str, Facts],
+    stated: dict[str, TableFacts],
 ) -> Facts:
     """Return the facts of a rig: of its cameras together, each of which counts the same."""
     first, *_ = cameras.values()
@@ -245,6 +250,7 @@ def join_cameras(
         curves={},
         thresholds={},
         oracles={},
+        disturbances=degradations(disturbed, frames, first.evaluation),
         seconds={},
         examples=[],
         training=TrainingFacts(first.training.source, model=first.training.model),
@@ -292,6 +298,7 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
     yield from _network_warnings(run)
     yield from _tuning_warnings(run)
     yield from _mask_warnings(run, totals)
+    yield from _disturbance_warnings(run)
     yield from _training_warnings(run)
     yield from _pick_warnings(run)
     yield from _constant_warnings(totals)
@@ -412,7 +419,8 @@ def _label_warnings(run: Run) -> Iterator[str]:
 
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost, and the frames on which a stage failed."""
-    return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
+    failed = (*run.failures.sentences(), *run.failures_disturbed.sentences())
+    return (*run.log.losses, *run.frames.accounting.losses, *failed)
 
 
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
@@ -434,6 +442,18 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
         notes = (*masks.notes, *masks.meaning.notes)
         yield from (Sentence("{}: {}: {}", shown, where, note) for note in notes)
     yield from run.frames.unpaired()
+
+
+def _disturbance_warnings(run: Run) -> Iterator[str]:
+    """Yield what could not be disturbed."""
+    names = [v.name for v in run.layouts if v.name not in run.disturbed_variants]
+    if run.config.frames.disturb and not run.disturbances:
+        yield Sentence("{frames.disturb}: nothing is disturbed, for there is no truth to score by")
+    elif run.disturbances and names:
+        yield Sentence(
+            "{frames.disturb}: not for {}, whose masks were made of the images as they are",
+            listing(names),
+        )
 
 
 def _mask_facts(run: Run) -> dict[str, Any]:
