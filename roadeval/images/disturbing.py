@@ -1,17 +1,8 @@
 """Disturbed images: a frame in the dark, in fog, out of focus, through a dirty lens, in rain.
 
-Each disturbance is a pure function of an image, drawn from the frame's number, so that any number
-of threads gives the same bytes. Strength 0 returns the image itself. Light is linear light, from 0
-(none) to 1 (white): IEC 61966-2-1's inverse of sRGB. To add a kind, add a line to `KINDS`.
-
-References
-----------
-.. [1] H. Koschmieder, Beiträge zur Physik der freien Atmosphäre 12, 1924, 33-53; with the
-   meteorological optical range of the WMO-No. 8 (Guide to Instruments), 2018, chapter 9.
-.. [2] EMVA Standard 1288, release 4.0, 2021, section 2: the noise of a linear camera.
-.. [3] J. Gu, R. Ramamoorthi, P. Belhumeur, S. Nayar, ACM Transactions on Graphics 28(5), 2009, 144.
-.. [4] K. Garg, S. K. Nayar, International Journal of Computer Vision 75(1), 2007, 3-27.
-.. [5] S. S. Halder, J.-F. Lalonde, R. de Charette, ICCV 2019, 10203-10212, equation 3.
+A disturbance is a pure function of an image, seeded by the frame's number: threads change nothing.
+Strength 0 returns the image itself. Light is linear, 0 to 1 (the inverse of sRGB's curve, IEC
+61966-2-1). To add a kind, add a line to `KINDS`.
 """
 
 from __future__ import annotations
@@ -31,29 +22,20 @@ from roadeval.errors import SettingError
 from roadeval.runtime.text import likely
 
 Light = npt.NDArray[np.float32]
-"""Linear light, ``(H, W, 3)``, or a map of one number a pixel, ``(H, W)``."""
+"""Linear light, ``(H, W, 3)``, or a number a pixel, ``(H, W)``."""
 
-FAR: Final = 80.0
-"""Metres beyond which all that stands on the ground hides it: 1/d^2 = 1/ground^2 + 1/FAR^2."""
-SKY: Final = 300.0
-"""Metres to the sky."""
+FAR, SKY = 80.0, 300.0
+"""Metres beyond which what stands on the ground hides it (1/d^2 = 1/ground^2 + 1/FAR^2), and to
+the sky."""
 ROOFS: Final = 6.0
 """How far houses and trees reach above the camera, by its height above the ground."""
-HAZE: Final = 0.6
-"""Light of the air in fog or rain, by that of the image's brightest hundredth, as a sky has it."""
-VISIBILITY: Final = 200.0
-"""Metres of visibility (contrast 5 %) in fog of strength 1; strength s has this over s."""
-RAIN: Final = 25.0
-"""Millimetres an hour of rain of strength 1, a heavy shower."""
-WELL: Final = 4096.0
-"""Electrons of a white pixel, of noise of strength 1; strength s has this over 4^(s - 1)."""
-READ_NOISE: Final = 3.0
-"""Standard deviation of the dark, in electrons."""
+WELL, READ_NOISE = 4096.0, 3.0
+"""Electrons of a white pixel, and the standard deviation of a dark one."""
 
-_CODES: Final = np.arange(256) / 255
-_LIGHT: Final = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4)
-_LIGHT_OF: Final = _LIGHT.astype(np.float32)
-_STEPS: Final = np.arange(1 << 16) / 65535
+_CODES, _STEPS = np.arange(256) / 255, np.arange(1 << 16) / 65535
+_LIGHT_OF: Final = np.where(
+    _CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4
+).astype(np.float32)
 _CODE_OF: Final = np.rint(
     255 * np.where(_STEPS <= 0.0031308, 12.92 * _STEPS, 1.055 * _STEPS ** (1 / 2.4) - 0.055)
 ).astype(np.uint8)
@@ -70,60 +52,54 @@ def to_codes(light: Light) -> Rgb:
 
 
 class Shot(NamedTuple):
-    """What a disturbance knows of a frame."""
+    """What a disturbance knows of a frame beside its image."""
 
     depth: Light
-    """Metres to the ground, ``(H, W)``, negative above the horizon, NaN where not known."""
+    """Metres to the ground, ``(H, W)``; negative above the horizon, NaN where not known."""
     random: np.random.Generator
-    """Drawn from the frame's number and the kind."""
 
 
 def _exposure(image: Rgb, stops: float, _: Shot) -> Rgb:
-    """Multiply the light by 2^stops; what exceeds white is clipped."""
+    """Multiply the light by 2^stops, and clip it at white."""
     return np.take(to_codes(_LIGHT_OF * np.float32(2**stops)), image)
 
 
 def _noisy(light: Light, well: float, random: np.random.Generator) -> Rgb:
-    """Add the noise of a sensor whose white is ``well`` electrons: variance e + read^2 [2]_.
-
-    Poisson's distribution is taken as normal.
-    """
-    electrons = light * np.float32(well)
-    deviation = np.sqrt(electrons + np.float32(READ_NOISE**2))
-    electrons += deviation * random.standard_normal(light.shape, np.float32)
-    return to_codes(electrons / np.float32(well))
+    """Add shot noise and read noise: of e electrons the variance is e + read^2 (EMVA 1288, 2.2)."""
+    deviation = np.sqrt(light * np.float32(well) + np.float32(READ_NOISE**2))
+    drawn = random.standard_normal(light.shape, np.float32)
+    return to_codes(light + deviation * drawn / np.float32(well))
 
 
 def _noise(image: Rgb, strength: float, shot: Shot) -> Rgb:
-    """Add shot noise and read noise, as at a gain of 4^strength [2]_."""
+    """Give white 4096 / 4^(strength - 1) electrons, as a higher gain does."""
     return _noisy(to_light(image), WELL * 4 ** (1 - strength), shot.random)
 
 
 def _dark(image: Rgb, stops: float, shot: Shot) -> Rgb:
-    """Divide the light by 2^stops before it falls on a sensor, whose noise stays [2]_."""
+    """Divide the light by 2^stops before it falls on the sensor, whose noise stays."""
     return _noisy(to_light(image) * np.float32(2**-stops), WELL, shot.random)
 
 
 def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float32]:
-    """Fade light into that of the air, L t + A (1 - t) with t = exp(-b d) (Koschmieder [1]_).
+    """Fade light into the air's, L t + A (1 - t) with t = exp(-b d) (Koschmieder, 1924).
 
-    What is above the horizon is sky the more the brighter it is. Returned is also A.
+    A is 0.6 of the brightest hundredth of the image; above the horizon what is bright is sky.
+    Returned is also A.
     """
     grey = light.mean(axis=2)
-    brightest = np.float32(np.percentile(grey[::4, ::4], 99))
+    brightest = np.float32(np.percentile(grey[::4, ::4], 99) + 1e-6)
     metres = np.where(depth < 0, np.float32(-ROOFS), np.float32(1)) * depth
     metres = np.nan_to_num(1 / np.hypot(1 / metres, np.float32(1 / FAR)), nan=FAR)
-    sky = np.clip(grey / max(brightest, np.float32(1e-6)) * 2 - np.float32(0.6), 0, 1)
-    metres = np.where(depth > 0, metres, metres + (np.float32(SKY) - metres) * sky)
-    through = np.exp(metres * np.float32(-per_metre))[..., None]
-    air = np.float32(HAZE) * brightest
-    return light * through + air * (1 - through), air
+    sky = np.clip(grey / brightest * 2 - np.float32(0.6), 0, 1) * ~(depth > 0)
+    through = np.exp((metres + (np.float32(SKY) - metres) * sky) * np.float32(-per_metre))
+    air = np.float32(0.6) * brightest
+    return air + (light - air) * through[..., None], air
 
 
 def _fog(image: Rgb, strength: float, shot: Shot) -> Rgb:
-    """Fade by distance in fog of a visibility of 200 m / strength, b = -ln 0.05 / V [1]_."""
-    per_metre = -math.log(0.05) * strength / VISIBILITY
-    return to_codes(_veil(to_light(image), per_metre, shot.depth)[0])
+    """Fade in fog of 200 m / strength of visibility V: b = -ln 0.05 / V (WMO-No. 8, chapter 9)."""
+    return to_codes(_veil(to_light(image), -math.log(0.05) * strength / 200, shot.depth)[0])
 
 
 def _blur(image: Rgb, strength: float, _: Shot) -> Rgb:
@@ -131,91 +107,83 @@ def _blur(image: Rgb, strength: float, _: Shot) -> Rgb:
     import cv2
 
     radius = strength * image.shape[1] / 320
-    reach = math.ceil(radius)
-    rows, columns = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    disk = np.clip(radius + 0.5 - np.hypot(rows, columns), 0, 1)
-    light, kernel = to_light(image), (disk / disk.sum()).astype(np.float32)
-    return to_codes(cv2.filter2D(light, -1, kernel, borderType=cv2.BORDER_REPLICATE))
+    reach = np.arange(-math.ceil(radius), math.ceil(radius) + 1)
+    disk = np.clip(radius + 0.5 - np.hypot(reach, reach[:, None]), 0, 1)
+    return to_codes(cv2.filter2D(to_light(image), -1, disk / disk.sum()))
 
 
 @lru_cache(4)
 def _spots(height: int, width: int, strength: float) -> Light:
-    """Return how much of each pixel dirt covers, from 0 to 1; the same spots for every frame."""
-    random, clear = np.random.default_rng(zlib.crc32(b"dirt")), np.ones((height, width), np.float32)
-    rows, columns = np.mgrid[:height, :width].astype(np.float32)
+    """Return how much of each pixel dirt covers, from 0 to 1; the same for every frame."""
+    random, clear = np.random.default_rng(zlib.crc32(b"dirt")), np.ones((height, width))
+    rows, columns = np.mgrid[:height, :width]
     for number in range(math.ceil(12 * strength)):
         x, y, size, thick, turn, flat = random.random(6)
-        radius = width * 0.015 * 6**size
-        right, down = columns - x * width, rows - y * height
-        along = right * math.cos(3 * turn) + down * math.sin(3 * turn)
-        across = (down * math.cos(3 * turn) - right * math.sin(3 * turn)) * (1 + flat)
-        edge = np.exp(-(((along**2 + across**2) / radius**2) ** 2))
-        part = min(1.0, 12 * strength - number)  # the last one grows
-        clear *= 1 - edge * np.float32(part * (0.6 + 0.4 * thick))
-    return 1 - clear
+        at = ((columns - x * width) + 1j * (rows - y * height)) * np.exp(3j * turn)
+        edge = np.hypot(at.real, at.imag * (1 + flat)) / (width * 0.015 * 6**size)
+        part = min(1.0, 12 * strength - number)  # the last spot grows
+        clear *= 1 - np.exp(-(edge**4)) * part * (0.6 + 0.4 * thick)
+    return (1 - clear).astype(np.float32)
 
 
 def _dirt(image: Rgb, strength: float, _: Shot) -> Rgb:
-    """Look through soft spots on the lens, 12 a strength: they dim light, and scatter it [3]_.
+    """Look through 12 soft spots a strength, which dim and scatter light (Gu et al., 2009, eq. 2).
 
-    A covered pixel keeps a fifth of its light and gets a quarter of the image's mean.
+    A covered pixel keeps a fifth of its light, and gets a quarter of the image's mean.
     """
     light, covered = to_light(image), _spots(*image.shape[:2], strength)[..., None]
-    mean = light[::4, ::4].mean(axis=(0, 1))
-    return to_codes(light * (1 - np.float32(0.8) * covered) + np.float32(0.25) * mean * covered)
+    scattered = np.float32(0.25) * light[::4, ::4].mean(axis=(0, 1))
+    return to_codes(light + (scattered - np.float32(0.8) * light) * covered)
 
 
 def _rain(image: Rgb, strength: float, shot: Shot) -> Rgb:
-    """Fade by distance, b = 0.312 R^0.67 a kilometre [5]_, and add bright streaks.
+    """Fade as in rain of R = 25 mm/h x strength, b = 0.312 R^0.67 / km (Halder et al., 2019).
 
-    R is 25 mm/h x strength. A streak covers a part a of a pixel, L (1 - a) + A a, with the light A
-    of the air, which drops refract [4]_; there are 300 a strength, near ones longer.
+    Then 300 streaks a strength, near ones longer: L (1 - a) + A a, with the light A of the air,
+    which drops refract (Garg and Nayar, 2007).
     """
     import cv2
 
     height, width = image.shape[:2]
-    veiled, air = _veil(to_light(image), 0.312e-3 * (RAIN * strength) ** 0.67, shot.depth)
-    streaks = np.zeros((height, width), np.uint8)
-    slant = shot.random.normal(0.1, 0.05)
+    light, air = _veil(to_light(image), 0.312e-3 * (25 * strength) ** 0.67, shot.depth)
+    streaks, slant = np.zeros((height, width), np.uint8), shot.random.normal(0.1, 0.05)
     for x, y, near, thick in shot.random.random((round(300 * strength), 4)):
         length = height * (0.02 + 0.1 * near**2)
-        start = round(x * width * 1.2 - 0.1 * width), round(y * height * 1.1 - 0.1 * height)
-        end = round(start[0] + slant * length), round(start[1] + length)
-        wide = max(1, round(width / 640 * (1 + near)))
-        cv2.line(streaks, start, end, round(50 + 70 * thick), wide, cv2.LINE_AA)
+        left, top = (1.2 * x - 0.1) * width, (1.1 * y - 0.1) * height
+        start, end = ((round(left + y * slant), round(top + y)) for y in (0, length))
+        thickness = max(1, round(width / 640 * (1 + near)))
+        cv2.line(streaks, start, end, round(50 + 70 * thick), thickness, cv2.LINE_AA)
     part = cv2.blur(streaks, (2, 3)).astype(np.float32)[..., None] / 255
-    return to_codes(veiled * (1 - part) + air * part)
+    return to_codes(light + (air - light) * part)
 
 
 def _jpeg(image: Rgb, quality: float, _: Shot) -> Rgb:
-    """Compress as a JPEG of this quality, as libjpeg counts it, with half the colour's samples."""
+    """Compress as a JPEG of this quality, as libjpeg counts it."""
     import cv2
 
-    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    file = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, round(quality)])[1]
-    decoded = cv2.imdecode(file, cv2.IMREAD_COLOR)
-    return np.asarray(cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB), np.uint8)
+    file = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, round(quality)])[1]
+    decoded = np.asarray(cv2.imdecode(file, cv2.IMREAD_COLOR), np.uint8)
+    return np.ascontiguousarray(decoded[..., ::-1])
 
 
 class Kind(NamedTuple):
-    """A kind of disturbance."""
+    """A kind of disturbance, with the meaning and the range of its strength."""
 
     title: str
     apply: Callable[[Rgb, float, Shot], Rgb]
     least: float
     most: float
-    """Range of its strength."""
 
 
 KINDS: Final[Mapping[str, Kind]] = {
-    "dark": Kind("less light, in stops", _dark, 0, 12),
-    "fog": Kind("fog, 200 m of visibility over", _fog, 0, 20),
-    "blur": Kind("out of focus, disk in 1/320 of the width", _blur, 0, 20),
-    "dirt": Kind("dirt on the lens, dozens of spots", _dirt, 0, 10),
-    "rain": Kind("rain, in 25 mm/h", _rain, 0, 10),
-    "jpeg": Kind("JPEG of a quality", _jpeg, 1, 100),
-    "noise": Kind("noise of a sensor, gain in 4^", _noise, 0, 6),
-    "exposure": Kind("exposure, in stops", _exposure, -10, 10),
+    "dark": Kind("stops of less light", _dark, 0, 12),
+    "fog": Kind("200 m over the visibility", _fog, 0, 20),
+    "blur": Kind("radius in 1/320 of the width", _blur, 0, 20),
+    "dirt": Kind("dozens of spots on the lens", _dirt, 0, 10),
+    "rain": Kind("25 mm/h", _rain, 0, 10),
+    "jpeg": Kind("quality, of which less is worse", _jpeg, 1, 100),
+    "noise": Kind("gain as a power of 4", _noise, 0, 6),
+    "exposure": Kind("stops of more light, or less", _exposure, -10, 10),
 }
 
 
@@ -231,22 +199,20 @@ class Disturbance(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Disturbance:
-        """Read ``KIND:STRENGTH``; a `SettingError` with the kinds, or the range, if it is none."""
+        """Read ``KIND:STRENGTH``; a `SettingError` with what is allowed if it is none."""
         kind, _, number = text.strip().partition(":")
-        known = KINDS.get(kind)
-        if known is None:
+        if (known := KINDS.get(kind)) is None:
             remedy = f"{likely(kind, KINDS)}choose {', '.join(KINDS)} (as fog:2)"
             raise SettingError(f"there is no disturbance {kind!r}", remedy=remedy)
         is_number = re.fullmatch(r"[+-]?\d{1,3}(\.\d{1,3})?", number)
         if not is_number or not known.least <= float(number) <= known.most:
-            allowed = f"{known.least:g} to {known.most:g}"
-            problem = f"the strength of {kind} is a number from {allowed}: {known.title}"
-            raise SettingError(f"{problem} (given: {text!r})")
+            allowed = f"from {known.least:g} to {known.most:g} ({known.title})"
+            raise SettingError(f"{text!r}: the strength of {kind} must be {allowed}")
         return cls(kind, float(number) + 0.0)
 
     @property
     def name(self) -> str:
-        """Its name in tables and paths, as ``fog-2`` and ``exposure-plus1``."""
+        """Its name in tables and paths, as ``fog-2``."""
         sign = "" if KINDS[self.kind].least >= 0 else "minus" if self.strength < 0 else "plus"
         return f"{self.kind}-{sign}{abs(self.strength):g}".replace(".", "_")
 
@@ -257,8 +223,8 @@ class Disturbance(NamedTuple):
     def of(self, image: Rgb, frame: int, depth: Light | None = None) -> Rgb:
         """Return an image, ``(H, W, 3)`` uint8 RGB, with this disturbance.
 
-        ``frame`` is the number that seeds what is drawn at random; ``depth`` is that of `Shot`,
-        by default that of `assumed_depth`.
+        ``frame`` seeds what is drawn at random; ``depth`` is that of `Shot`, by default of
+        `assumed_depth`.
         """
         if self.strength == 0:
             return image
@@ -270,11 +236,9 @@ class Disturbance(NamedTuple):
 
 @lru_cache(4)
 def assumed_depth(height: int, width: int) -> Light:
-    """Return the metres to flat ground, by row: h f / (row - horizon).
+    """Return the metres to flat ground by row, h f / (row - horizon), of a camera as in many cars.
 
-    A camera like many in cars is assumed: at h = 1.4 m, of f = 0.8 of the width, with the horizon
-    at 45 % of the height.
+    It is at h = 1.4 m, with f = 0.8 of the width and the horizon at 45 % of the height.
     """
-    below = np.arange(height, dtype=np.float32) - np.float32(0.45 * height - 0.01)
-    metres = np.float32(1.4 * 0.8 * width) / below
-    return np.ascontiguousarray(np.broadcast_to(metres[:, None], (height, width)))
+    metres = 1.4 * 0.8 * width / (np.arange(height) - 0.45 * height + 0.01)
+    return np.repeat(metres.astype(np.float32)[:, None], width, axis=1)

@@ -12,7 +12,6 @@ from annotated_types import Interval, Len
 
 from roadeval.errors import SettingError
 from roadeval.geometry.settings import GroundSettings
-from roadeval.images.disturbing import Disturbance
 from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.runtime.sentence import Sentence
@@ -70,6 +69,8 @@ def _time(moment: object) -> object:
 
 def _disturbances(value: object) -> object:
     """Return disturbances as they are named, one a text; several may stand in one."""
+    from roadeval.images.disturbing import Disturbance
+
     texts = [value] if isinstance(value, str) else value
     if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
         return value

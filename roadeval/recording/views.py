@@ -149,17 +149,16 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
 
 
 def _disturbed(layout: Layout) -> BlueprintPart:
-    """Return a tab a variant, with its errors on the images of each disturbance."""
-    names = next(iter(layout.disturbed.values()))
+    """Return a tab for each variant, with its errors on the images of each disturbance."""
     tabs = []
-    for variant in (variant for variant in layout.shown if variant.name in names):
-        paths = {name: f"{at.DISTURBED}/{name}" for name in layout.disturbed}
-        views = [outcome(layout, variant)]
-        views += [
+    for variant in layout.shown:
+        paths = {n: f"{at.DISTURBED}/{n}" for n, v in layout.disturbed.items() if variant.name in v}
+        views = [
             picture(f"{name}: errors", below + at.CAMERA, f"{below}/{variant.name}/{ERRORS.name}")
             for name, below in paths.items()
         ]
-        tabs.append(rrb.Grid(*views, name=variant.name))
+        grid = rrb.Grid(outcome(layout, variant), *views, name=variant.name)
+        tabs += [grid] if views else []
     return rrb.Tabs(*tabs, active_tab=0, name="Disturbed")
 
 

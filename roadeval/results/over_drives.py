@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
-from roadeval.evaluation.score.degradation import Degradation, Degradations, as_corrected
+from roadeval.evaluation.score.degradation import Degradations, as_corrected
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import over_drives, strata
@@ -92,23 +92,23 @@ def _degradations(
 
     if len(by_drive) == 1:
         return next(iter(by_drive.values()))
-    parts: dict[tuple[str, str], dict[str, Degradation]] = {}
-    for drive, variants in by_drive.items():
-        for variant, changes in variants.items():
-            for name, change in changes.items():
-                parts.setdefault((variant, name), {})[drive] = change
+    rows = pd.DataFrame(
+        [
+            (variant, name, drive, groups[drive], change.difference.mean, change)
+            for drive, variants in by_drive.items()
+            for variant, changes in variants.items()
+            for name, change in changes.items()
+        ],
+        columns=["variant", "name", "drive", "group", "mean", "change"],
+    )
     means = {}
-    for key, drives in parts.items():
-        rows = pd.DataFrame(
-            [
-                (drive, groups[drive], change.ERR, change.base_ERR, change.difference.mean)
-                for drive, change in drives.items()
-            ],
-            columns=["drive", "group", "ERR", "base_ERR", "mean"],
+    for names, drives in group_rows(rows, ["variant", "name"]):
+        changes, over = drives["change"], over_drives(drives, confidence)
+        error, base = (
+            float(pd.Series([getattr(change, name) for change in changes], dtype=float).mean())
+            for name in ("ERR", "base_ERR")
         )
-        first, difference = next(iter(drives.values())), over_drives(rows, confidence)
-        error, base = (float(rows[name].mean()) for name in ("ERR", "base_ERR"))
-        means[key] = Degradation(first.kind, first.strength, error, base, difference)
+        means[names] = replace(changes.iloc[0], ERR=error, base_ERR=base, difference=over)
     return as_corrected(means)
 
 

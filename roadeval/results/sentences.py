@@ -115,7 +115,7 @@ def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
     ends = f"{percent(base, 1)} to {percent(error, 1)} %"
     sure = sum(is_significant(change.difference) for change in changes)
     more = f" {sure} of {len(disturbances[variant])} make it worse beyond chance."
-    most = f"{worst.disturbance} {does} the ERR of {variant}{by.format(times)}: {ends}."
+    most = f"{worst.text} {does} the ERR of {variant}{by.format(times)}: {ends}."
     return f"{most}{more * bool(sure)}"
 
 

@@ -143,9 +143,9 @@ def test_a_disturbance_has_a_plain_name_and_the_text_that_makes_it(text, name, s
     [
         ("fogg:2", "did you mean fog"),
         ("", "choose dark, fog"),
-        ("fog", "number from 0 to 20"),
-        ("jpeg:0", "number from 1 to 100"),
-        ("noise:-1", "number from 0 to 6"),
+        ("fog", "must be from 0 to 20"),
+        ("jpeg:0", "from 1 to 100"),
+        ("noise:-1", "from 0 to 6"),
     ],
 )
 def test_a_wrong_disturbance_is_told_with_what_is_allowed(text, says):

@@ -13,13 +13,12 @@ from roadeval.cli import console
 from roadeval.cli.options import FLAGS
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
-from roadeval.report.blocks import Block, Heading, Text
-from roadeval.report.sections.disturbances import errors_table
+from roadeval.report.blocks import Block, Heading
+from roadeval.report.sections import disturbances
 from roadeval.report.sections.drives import by_reason, drives_table
 from roadeval.report.sections.summary import drives_account
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.sentences import describe_disturbances
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,9 +45,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     if facts.totals:
         blocks: list[Block] = [rates_table(facts)]
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
-        if facts.disturbances:
-            blocks.append(errors_table(facts))
-            blocks.append(Text(describe_disturbances(facts.disturbances, facts.focus)))
+        blocks += disturbances.brief(facts)
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show(
             [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],

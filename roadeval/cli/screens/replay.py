@@ -17,11 +17,11 @@ from roadeval.data.words import counted, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
-from roadeval.report.sections.disturbances import errors_table
+from roadeval.report.sections import disturbances
 from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
-from roadeval.results.sentences import account, correction, describe_disturbances
+from roadeval.results.sentences import account, correction
 from roadeval.results.verdict import ROBUST, without_truth
 
 BARS: Final = "▁▂▃▄▅▆▇█"
@@ -71,9 +71,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
             yield Text(legend)
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
-    if facts.disturbances:
-        yield errors_table(facts)
-        yield Text(describe_disturbances(facts.disturbances, facts.focus))
+    yield from disturbances.brief(facts)
     if metres:
         yield distance_table(metres, [*facts.finals], brief=True)
 

@@ -19,16 +19,7 @@ from typing import Any, Final, Protocol
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
 from roadeval.config.variants import Variant
-from roadeval.data import (
-    Calibration,
-    Frame,
-    FrameResult,
-    Output,
-    Role,
-    StageResult,
-    VariantLayout,
-    VariantResult,
-)
+from roadeval.data import Calibration, Frame, FrameResult, Role, VariantLayout, VariantResult
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
@@ -147,14 +138,6 @@ class Run:
     """The camera's name in a rig; elsewhere its topic is its name."""
     failures: Failures = field(default_factory=Failures)
     """The frames on which a stage failed, so far."""
-    failures_disturbed: Failures = field(default_factory=Failures)
-    """The frames that could be evaluated, but not with a disturbance."""
-
-    @cached_property
-    def disturbances(self) -> Mapping[str, Disturbance]:
-        """The disturbances of evaluated frames, by their texts; none without truth."""
-        texts = self.config.frames.disturb if self.selection.truth else ()
-        return {text: Disturbance.parse(text) for text in texts}
 
     @cached_property
     def disturbed_variants(self) -> tuple[str, ...]:
@@ -188,13 +171,13 @@ class Run:
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
         """Add a frame, in the camera's order; return it with the lines that take that order."""
         doubts = self.board.add(done.result)
-        for failure in done.failures:
-            self.failures_disturbed.add(failure)
         frame, variants = done.result.frame, done.result.variants
         final_masks = [[*v.masks()][-1][1] for v in variants if v.variant not in frame.external]
         self.fit.add(frame, final_masks)
         if done.result.role in TRIED:
             self.failures.first = None
+        for failure in done.failures:
+            self.failures.add(failure)
         lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
         return replace(done, lines={**done.lines, **lines})
 
@@ -211,7 +194,11 @@ class Run:
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
-            disturbed={d.name: self.disturbed_variants for d in self.disturbances.values()},
+            disturbed={
+                Disturbance.parse(text).name: self.disturbed_variants
+                for text in self.config.frames.disturb
+                if self.selection.truth
+            },
             focus=self.board.unlabelled.focus,
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
@@ -499,28 +486,24 @@ def _process(
 
 def _disturb(run: Run, frame: Frame) -> tuple[dict[str, FrameResult], list[Failure]]:
     """Run the chains on a frame's disturbed images; return the scored final masks, and failures."""
-    results: dict[str, FrameResult] = {}
-    failures = []
-    plain = replace(frame, payload=b"", media_type=None, shadow_truth=None, external={})
-    for text, disturbance in run.disturbances.items():
-        image = disturbance.of(frame.image, frame.number, run.depth)
-        view, shared = View.of(image, frame.moment), dict[Any, Any]()
-        variants = []
+    results, failures = dict[str, FrameResult](), list[Failure]()
+    assert frame.truth is not None
+    for text in run.config.frames.disturb:
+        image = Disturbance.parse(text).of(frame.image, frame.number, run.depth)
+        view, shared, variants = View.of(image, frame.moment), dict[Any, Any](), []
         for name in run.disturbed_variants:
             try:
-                stages = [*run.chains[name].run(view, shared)]
+                *_, last = (s for s in run.chains[name].run(view, shared) if s.output.mask)
             except StageError as error:
                 where = "".join(traceback.format_exception(error))
                 reason = Sentence("{}: {}", text, error.sentence)
                 failures.append(Failure(frame.number, Role.EVALUATED, name, reason, where))
                 continue
-            last = [stage for stage in stages if stage.output.mask is not None][-1]
-            layers = [a for a in last.output.layers if a.spec.name == last.stage]
-            output = Output(tuple(layers), mask=last.output.mask)
-            variants.append(VariantResult(name, (StageResult(last.stage, output, last.seconds),)))
-        assert frame.truth is not None
-        bare = replace(plain, image=image, truth=None)
-        results[text] = score_finals(
-            FrameResult(bare, Role.EVALUATED, tuple(variants)), frame.truth
-        )
+            layers = tuple(a for a in last.output.layers if a.spec.name == last.stage)
+            last = replace(last, output=replace(last.output, layers=layers))
+            variants.append(VariantResult(name, (last,)))
+        # Its file is the undisturbed image's, and its truth is recorded there.
+        bare = replace(frame, image=image, media_type=None, truth=None, shadow_truth=None)
+        result = FrameResult(bare, Role.EVALUATED, tuple(variants))
+        results[text] = score_finals(result, frame.truth)
     return results, failures

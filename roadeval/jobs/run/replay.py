@@ -130,7 +130,6 @@ def _replay_log(
         facts = _finish_recording(runs, ended, recorder, results, config)
         sidecar.finish()
         tracebacks = tuple(text for run in runs for text in run.failures.tracebacks())
-        tracebacks += tuple(t for run in runs for t in run.failures_disturbed.tracebacks())
         del runs  # figures take the room of its frames and models
         trim()
         if config.output.figures:

@@ -298,7 +298,7 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
     yield from _network_warnings(run)
     yield from _tuning_warnings(run)
     yield from _mask_warnings(run, totals)
-    yield from _disturbance_warnings(run)
+    yield from _disturbance_warnings(run) if run.config.frames.disturb else ()
     yield from _training_warnings(run)
     yield from _pick_warnings(run)
     yield from _constant_warnings(totals)
@@ -419,8 +419,7 @@ def _label_warnings(run: Run) -> Iterator[str]:
 
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost, and the frames on which a stage failed."""
-    failed = (*run.failures.sentences(), *run.failures_disturbed.sentences())
-    return (*run.log.losses, *run.frames.accounting.losses, *failed)
+    return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
 
 
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
@@ -447,13 +446,11 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
 def _disturbance_warnings(run: Run) -> Iterator[str]:
     """Yield what could not be disturbed."""
     names = [v.name for v in run.layouts if v.name not in run.disturbed_variants]
-    if run.config.frames.disturb and not run.disturbances:
-        yield Sentence("{frames.disturb}: nothing is disturbed, for there is no truth to score by")
-    elif run.disturbances and names:
-        yield Sentence(
-            "{frames.disturb}: not for {}, whose masks were made of the images as they are",
-            listing(names),
-        )
+    if not run.selection.truth:
+        yield Sentence("{frames.disturb}: nothing is disturbed without truth to score against")
+    elif names:
+        why = "whose masks were made of the images as they are"
+        yield Sentence("{frames.disturb}: not for {}, {}", listing(names), why)
 
 
 def _mask_facts(run: Run) -> dict[str, Any]:
@@ -502,7 +499,7 @@ def _account_for_frames(run: Run) -> FrameAccount:
         "outside the range": seen.in_log - seen.in_range,
         f"not read ({'no truth, ' * labelled}stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
-        "failed in a stage": len(run.failures),
+        "failed in a stage": seen.read - len(seen.undecodable) - sum(roles.values()),
         "trained on": roles[Role.TRAINING],
         "equal to a training frame": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],

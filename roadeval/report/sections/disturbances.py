@@ -1,9 +1,8 @@
-"""How the variants stand disturbances: a chart, a sentence, and a table of ERR."""
+"""How the variants stand disturbances: a sentence, a chart, and tables of ERR."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
 
 from roadeval.data.words import in_percent, number, percent, points
 from roadeval.evaluation.metrics import TESTED
@@ -17,8 +16,6 @@ from roadeval.results.facts import Facts, FleetFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import correction, describe_disturbances, marked_interval
 
-UNDISTURBED: Final = "none"
-
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     """Yield ERR under each disturbance; nothing if there was none."""
@@ -27,77 +24,62 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
         return
     yield Heading("How it stands disturbances")
     yield Text(describe_disturbances(facts.disturbances, facts.focus))
-    yield Figure([_chart(facts)], caption("disturbances"))
+    by_variant, columns = looks([*facts.finals]), errors_by_variant(facts)
+    names = [*next(iter(columns.values()))]
+    marks = [
+        series(name, by_variant[name], range(len(names)), [*map(in_percent, errors.values())])
+        for name, errors in columns.items()
+    ]
+    chart = Chart("ERR by disturbance", ChartKind.MARKS, marks, names)
+    yield Figure([chart], caption("disturbances"))
     yield Details("Every disturbance in numbers", [_table(facts), note("disturbance intervals")])
 
 
-def _chart(facts: Facts | FleetFacts) -> Chart:
-    rows, marks = _errors(facts), []
-    by_variant = looks([*facts.finals])
-    for place, variant in enumerate(facts.disturbances):
-        errors = [100 * row[place] for row in rows.values()]
-        marks.append(series(variant, by_variant[variant], range(len(rows)), errors))
-    return Chart("ERR by disturbance", ChartKind.MARKS, marks, names=[*rows])
+def errors_by_variant(facts: Facts | FleetFacts) -> dict[str, dict[str, float | None]]:
+    """Return each variant's ERR without a disturbance, ``none``, and by each one's text."""
+    columns: dict[str, dict[str, float | None]] = {}
+    texts = [c.text for changes in facts.disturbances.values() for c in changes.values()]
+    for name, changes in facts.disturbances.items():
+        columns[name] = {"none": facts.totals[name][facts.finals[name]][TESTED]}
+        columns[name] |= dict.fromkeys(texts) | {c.text: c.ERR for c in changes.values()}
+    return columns
 
 
-def _errors(facts: Facts | FleetFacts) -> dict[str, list[float]]:
-    """Return ERR of each variant that was disturbed, by disturbance, the first without any."""
-    finals = {name: facts.totals[name][facts.finals[name]] for name in facts.disturbances}
-    rows = {UNDISTURBED: [float(rates[TESTED]) for rates in finals.values()]}
-    by_name: dict[str, dict[str, float | None]] = {}
-    for variant, changes in facts.disturbances.items():
-        for change in changes.values():
-            by_name.setdefault(change.disturbance, {})[variant] = change.ERR
-    for text, errors in by_name.items():
-        rows[text] = [in_percent(errors.get(name)) / 100 for name in finals]
-    return rows
-
-
-def errors_table(facts: Facts | FleetFacts) -> Table:
-    """Tabulate ERR alone: a row for each disturbance, a column for each variant."""
-    return Table(
-        ["disturbed by", *facts.disturbances],
-        [[text, *map(percent, errors)] for text, errors in _errors(facts).items()],
-        text_columns=(0,),
-        caption=caption("disturbances"),
-        small=True,
-    )
+def brief(facts: Facts | FleetFacts) -> Iterator[Block]:
+    """Yield what a terminal shows: ERR by disturbance and variant, and the sentence."""
+    if columns := errors_by_variant(facts):
+        cells = zip(*(map(percent, errors.values()) for errors in columns.values()), strict=True)
+        names = next(iter(columns.values()))
+        rows = [[text, *row] for text, row in zip(names, cells, strict=True)]
+        legend = caption("disturbances")
+        yield Table(["disturbed by", *columns], rows, text_columns=(0,), caption=legend, small=True)
+        yield Text(describe_disturbances(facts.disturbances, facts.focus))
 
 
 def _table(facts: Facts | FleetFacts) -> Table:
     rows: list[list[Cell | str]] = []
-    breaks, unit = [], ""
+    breaks, family = [], []
     for variant, changes in facts.disturbances.items():
         breaks.append(len(rows))
         for place, change in enumerate(changes.values()):
-            difference = change.difference
-            unit = difference.unit
+            family.append(change.difference)
             rows.append(
                 [
                     "" if place else variant_cell(variant, [*facts.finals]),
-                    change.disturbance,
+                    change.text,
                     *map(percent, (change.base_ERR, change.ERR)),
-                    points(difference.mean),
-                    marked_interval(difference),
-                    *(number(n or 0) for n in (difference.better, difference.worse)),
+                    points(change.difference.mean),
+                    marked_interval(change.difference),
+                    number(change.difference.better or 0),
+                    number(change.difference.worse or 0),
                 ]
             )
-    family = [c.difference for changes in facts.disturbances.values() for c in changes.values()]
     return Table(
-        [
-            "variant",
-            "disturbed by",
-            "from, %",
-            "to, %",
-            "change, pp",
-            "interval, pp",
-            "better",
-            "worse",
-        ],
+        ["variant", "disturbed by", "from, %", "to, %", "pp", "interval", "better", "worse"],
         rows,
         text_columns=(0, 1),
         breaks=breaks[1:],
-        groups=[("", 2), ("ERR", 4), (unit, 2)],
+        groups=[("", 2), ("ERR", 4), (family[0].unit, 2)],
         caption=correction(family),
         small=True,
     )
