@@ -28,8 +28,8 @@ FINAL_STAGE: Final = "post"
 
 RESERVED: Final = frozenset(
     {
-        *("blind", "camera", "counts", "facts", "frame", "ground", "metrics", "notes", "results"),
-        *("roadeval", "state", "timing", "true_shadow", "truth"),
+        *("blind", "camera", "counts", "disturbed", "facts", "frame", "ground", "metrics"),
+        *("notes", "results", "roadeval", "state", "timing", "true_shadow", "truth"),
     }
 )
 """Names that no variant may have, because tables and recordings use them."""
@@ -217,7 +217,8 @@ class FrameResult:
     mask to final mask. ``contours``, and ``metres`` if the camera is known, measure final masks by
     variant. ``histograms`` count labelled pixels by their probability of road, for each variant and
     stage with one, and ``above`` does so for the ground seen from above. ``oracles`` are the counts
-    of later stages after one is replaced by the truth, by that one. ``notes`` are sentences.
+    of later stages after one is replaced by the truth, by that one. ``disturbed`` has the final
+    masks of the disturbed frame, by the disturbance as ``fog:2``. ``notes`` are sentences.
     """
 
     frame: Frame
@@ -232,6 +233,7 @@ class FrameResult:
     contours: Mapping[str, Contour] = field(default_factory=dict)
     histograms: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
+    disturbed: Mapping[str, FrameResult] = field(default_factory=dict)
     doubts: tuple[Doubt, ...] = ()
     metres: Mapping[str, FrameMetres] = field(default_factory=dict)
     above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
@@ -244,7 +246,11 @@ class FrameResult:
             VariantResult(v.variant, tuple(stage.without_layers() for stage in v.stages))
             for v in self.variants
         )
-        return replace(self, variants=variants)
+        disturbed = {
+            name: replace(result.without_layers(), frame=self.frame, errors={})
+            for name, result in self.disturbed.items()
+        }
+        return replace(self, variants=variants, disturbed=disturbed)
 
 
 Cells = npt.NDArray[Any]

@@ -81,6 +81,17 @@ class Ground:
         """Return the places of `rays` on the ground, ``(n, 2)``; NaN at and above the horizon."""
         return _apply(_inverse(self.plane), rays)
 
+    def distances(self) -> Matrix:
+        """Return the metres to the ground at each pixel, ``(H, W)``; NaN where no ray is.
+
+        Above the horizon they are negative: to the plane that is as far above the camera.
+        """
+        rows, columns = np.mgrid[: self.height, : self.width].reshape(2, -1)
+        rays = self.rays(np.column_stack([columns, rows]).astype(float))
+        ahead, left, below = _inverse(self.plane) @ np.column_stack([rays, np.ones(len(rays))]).T
+        with np.errstate(divide="ignore"):
+            return (np.hypot(ahead, left) / below).reshape(self.height, self.width)
+
     def pixel_at(self, ahead: float) -> tuple[float, float]:
         """Return the metres, along and across, that a pixel straight ahead covers, or NaN."""
         (at,) = self.pixels(np.array([[ahead, 0.0]]))

@@ -67,6 +67,17 @@ def _time(moment: object) -> object:
     return moment
 
 
+def _disturbances(value: object) -> object:
+    """Return disturbances as they are named, one a text; several may stand in one."""
+    from roadeval.images.disturbing import Disturbance
+
+    texts = [value] if isinstance(value, str) else value
+    if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
+        return value
+    words = [word for text in texts for word in text.split(",")]
+    return tuple(dict.fromkeys(str(Disturbance.parse(word)) for word in words))
+
+
 Time = Annotated[str, Checked(_time)]
 """A moment as `roadeval.logs.settings.parse_time` reads it."""
 Count = Interval(ge=1, le=1_000_000_000)
@@ -231,6 +242,8 @@ class FrameSettings:
     max_frames: Greatest number of frames to read.
     scale: Share of their width and height to which frames and truth are reduced. A smaller one is
         quicker and coarser, and gives other results.
+    disturb: Disturbance of the evaluated frames, as fog:2, under which every variant is scored once
+        more: dark, fog, blur, dirt, rain, jpeg, noise or exposure, and its strength.
     max_pixels: Greatest number of pixels of an image. Larger images are not decoded: a damaged head
         may claim any size.
     unturned: Images as they are stored, without the turn of their EXIF orientation or a video's
@@ -247,6 +260,9 @@ class FrameSettings:
     labelled: Annotated[bool, Flag("--labelled")] = False
     max_frames: Annotated[int | None, Count, Flag("--max-frames", "N")] = None
     scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0
+    disturb: Annotated[
+        tuple[str, ...], Checked(_disturbances), Flag("--disturb", "KIND:STRENGTH,...")
+    ] = ()
     max_pixels: Annotated[int, Interval(ge=1, le=1 << 30), Flag("--max-pixels", "N", "Input")] = (
         MAX_PIXELS
     )

@@ -47,7 +47,7 @@ from roadeval.data.colours import ColourWithOpacity
 from roadeval.images.decoding import palette_indices, to_labels, to_rgb
 from roadeval.images.formats import MAX_PIXELS, Limits
 from roadeval.kernels import KERNELS
-from roadeval.recording.layout import CAMERA, GROUND, Layout
+from roadeval.recording.layout import CAMERA, DISTURBED, GROUND, Layout
 
 Array = npt.NDArray[Any]
 JPEG_QUALITY: Final = 90
@@ -66,6 +66,8 @@ def codecs_of(layout: Layout) -> dict[str, Codec]:
     width, height = layout.width, layout.height
     codecs: dict[str, Codec] = {CAMERA: Codec(width, height)}
     codecs |= {path: codec(spec, width, height) for path, spec in layout.images()}
+    for name in layout.disturbed:
+        codecs[f"{DISTURBED}/{name}{CAMERA}"] = Codec(width, height)
     if (plan := layout.plan()) is not None:
         rows, columns = plan.cells.shape
         codecs[GROUND] = Codec(columns, rows)

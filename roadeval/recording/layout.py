@@ -53,6 +53,8 @@ GROUND: Final = "/ground"
 """The camera's image seen from above; below this path lie the truth and each variant's errors."""
 CELL: Final = 0.16
 """Side of a cell of the ground seen from above, in metres."""
+DISTURBED: Final = "/disturbed"
+"""Below this path and the name of each disturbance lie the image, and the variants' masks."""
 NOTES: Final = "/notes"
 GUIDE: Final = "/results/guide"
 FRAME_RATES: Final = "/results/frame"
@@ -118,6 +120,8 @@ class Layout:
     has_truth: bool = True
     """Whether any frame has truth of the road."""
     has_shadow_truth: bool = False
+    disturbed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """The variants that run on the images of each disturbance, by its name."""
     focus: str = ""
     """The variant whose errors, or doubts, rank the frames; all of them if it is empty."""
     first_frame: int | None = None
@@ -164,6 +168,11 @@ class Layout:
                 yield f"/{variant.name}/{spec.name}", spec
             if self.has_truth:
                 yield f"/{variant.name}/{ERRORS.name}", ERRORS
+        for name, variants in self.disturbed.items():
+            for variant in (variant for variant in self.variants if variant.name in variants):
+                (post,) = (spec for spec in variant.layers if spec.name == variant.stages[-1])
+                for spec in (post, ERRORS):
+                    yield f"{DISTURBED}/{name}/{variant.name}/{spec.name}", spec
 
     def plan(self) -> Plan | None:
         """Return how the ground is seen from above; None where it is unknown."""

@@ -35,6 +35,7 @@ from roadeval.data.arrays import IGNORED
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.geometry.plan import Plan
+from roadeval.images.disturbing import Disturbance
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
 from roadeval.recording import views
@@ -94,6 +95,10 @@ def _encode_images(
         yield at.CAMERA, bytes(frame.payload)
     else:
         images.insert(0, (at.CAMERA, frame.image))
+    for text, disturbed in result.disturbed.items():
+        below = f"{at.DISTURBED}/{Disturbance.parse(text).name}"
+        pictures = [(at.CAMERA, disturbed.frame.image), *_layer_images(disturbed, None, kinds)]
+        images += [(below + path, image) for path, image in pictures]
     for path, image in images:
         if image is not None:
             codec = camera.codecs[path]

@@ -128,6 +128,8 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
     if layout.ground:
         tabs.append(_on_the_ground(layout, layout.ground))
     tabs += [_every_layer(layout, variant) for variant in layout.variants]
+    if layout.disturbed:
+        tabs.append(_disturbed(layout))
     if layout.has_truth:
         masks = [*layout.scored()]
         rates = [rate for rate in SHORT if rate in layout.rates]
@@ -144,6 +146,20 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
     texts = (document(f"/results/{name}", title) for name, title in results)
     tabs.append(rrb.Horizontal(*texts, name="Results"))
     return tabs
+
+
+def _disturbed(layout: Layout) -> BlueprintPart:
+    """Return a tab for each variant, with its errors on the images of each disturbance."""
+    tabs = []
+    for variant in layout.shown:
+        paths = {n: f"{at.DISTURBED}/{n}" for n, v in layout.disturbed.items() if variant.name in v}
+        views = [
+            picture(f"{name}: errors", below + at.CAMERA, f"{below}/{variant.name}/{ERRORS.name}")
+            for name, below in paths.items()
+        ]
+        grid = rrb.Grid(outcome(layout, variant), *views, name=variant.name)
+        tabs += [grid] if views else []
+    return rrb.Tabs(*tabs, active_tab=0, name="Disturbed")
 
 
 def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:

@@ -21,6 +21,7 @@ from pydantic import TypeAdapter, ValidationError
 from roadeval.data import BASELINE, FILTERED, TUNED, UNFILTERED, Calibration
 from roadeval.data.words import listing
 from roadeval.errors import RoadevalError
+from roadeval.evaluation.score.degradation import Degradations
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference
@@ -166,6 +167,7 @@ class FactsFile:
     totals: Totals
     effects: list[Effect]
     misfits: list[str]
+    disturbances: Degradations
     run: dict[str, Any]
 
     @cached_property
@@ -279,6 +281,8 @@ class Facts(FactsFile):
     """The paired differences of the drive."""
     oracles: dict[str, Totals] = field(default_factory=dict)
     """Totals with a stage replaced by the truth."""
+    disturbances: Degradations = field(default_factory=dict)
+    """ERR of final masks on disturbed frames, by variant and disturbance."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
     windows: int = 0
@@ -321,11 +325,11 @@ class Facts(FactsFile):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled", "estimate", "misfits"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances"),
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "methods", "masks", "files"),
-        *("cameras", "unlabelled", "estimate", "misfits"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances"),
     )
 
     def content(self) -> dict[str, Any]:
@@ -430,13 +434,16 @@ class FleetFacts(FactsFile):
     """The configuration of the fleet."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
+    disturbances: Degradations = field(default_factory=dict)
+    """ERR of final masks on disturbed frames, over drives."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
     RESULTS = (
         *("verdict", "counts", "frames", "totals", "effects", "strata", "warnings", "misfits"),
+        "disturbances",
     )
-    OPTIONAL = ("misfits",)
+    OPTIONAL = ("misfits", "disturbances")
 
 
 def is_fleet(path: str | Path) -> bool:

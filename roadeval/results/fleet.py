@@ -25,6 +25,7 @@ from roadeval.data import is_plain
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
+from roadeval.evaluation.score.degradation import Degradations
 from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, group_rows, is_final, only, values_of
@@ -392,23 +393,24 @@ class FleetWriter:
             writing(self.folder, ResultsError),
             claim_files(*(self.folder / name for name in FILES)),
         ):
-            finals, within = self._write_tables(members, asked or {})
-            facts = summarise(finals, members, settings, dict(run), within)
+            finals, within, disturbed = self._write_tables(members, asked or {})
+            facts = summarise(finals, members, settings, dict(run), within, disturbances=disturbed)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts
 
     def _write_tables(
         self, members: Sequence[Member], digests: Mapping[str, str]
-    ) -> tuple[dict[str, pd.DataFrame], list[Effect]]:
+    ) -> tuple[dict[str, pd.DataFrame], list[Effect], dict[str, Degradations]]:
         """Write every table, all of them before the first one takes its name.
 
         Returned are the tables from which the facts follow: ``drives``, and the rows of ``scores``
         and ``effects`` of final masks on all pixels; and the differences within the only drive, if
-        just one was scored.
+        just one was scored; and the disturbances of each drive that has any.
         """
         tags = sorted({key for member in members for key in member.tags})
         rows: dict[str, list[Any]] = {"drives": [], "effects": [], "within": [], "cached": []}
+        rows["disturbed"] = []
         for member in members:
             self._add(member, self._read_made(member.drive, digests), rows)
         try:
@@ -426,7 +428,8 @@ class FleetWriter:
             "scores": only(made["scores"], final=True, region=ALL),
             "effects": only(made["effects"], final=True),
         }
-        return finals, rows["within"] if len(finals["effects"]["drive"].unique()) == 1 else []
+        within = rows["within"] if len(finals["effects"]["drive"].unique()) == 1 else []
+        return finals, within, dict(rows["disturbed"])
 
     def _add(self, member: Member, made: Made, rows: Mapping[str, list[Any]]) -> None:
         """Add a drive's rows to those of each table."""
@@ -442,6 +445,7 @@ class FleetWriter:
         how |= {"camera": key.camera, "seconds": made.seconds}
         rows["effects"] += effect_rows(facts, key)
         rows["within"] += facts.final_effects
+        rows["disturbed"] += [(member.drive, facts.disturbances)] if facts.disturbances else []
         if facts.frames.evaluated:
             rows["cached"].append(member.drive)
         rows["drives"].append({**drive_row(facts, member.name, member.source), **how})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
+from roadeval.evaluation.score.degradation import Degradations, as_corrected
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import over_drives, strata
@@ -33,11 +34,14 @@ def summarise(
     settings: EvaluationSettings,
     run: dict[str, Any],
     within_one: Sequence[Effect] = (),
+    *,
+    disturbances: Mapping[str, Degradations] | None = None,
 ) -> FleetFacts:
     """Return the facts of a fleet.
 
     ``tables`` are ``drives``, and the rows of ``scores`` and ``effects`` of final masks on all
-    pixels. ``within_one`` are the differences within the drive if only one was scored.
+    pixels. ``within_one`` are the differences within the drive if only one was scored;
+    ``disturbances`` those of each drive.
     """
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
@@ -75,8 +79,37 @@ def summarise(
         warnings=[*_warnings_of_copies(copies, cameras), *_warnings_of_drives(rows)],
         run=run,
         misfits=[*_misfits(rows)],
+        disturbances=_degradations(disturbances or {}, groups, settings.confidence),
     )
     return replace(facts, verdict=verdict_on(facts))
+
+
+def _degradations(
+    by_drive: Mapping[str, Degradations], groups: Mapping[str, str], confidence: float
+) -> Degradations:
+    """Return the means over drives; of a single drive its own."""
+    import pandas as pd
+
+    if len(by_drive) == 1:
+        return next(iter(by_drive.values()))
+    rows = pd.DataFrame(
+        [
+            (variant, name, drive, groups[drive], change.difference.mean, change)
+            for drive, variants in by_drive.items()
+            for variant, changes in variants.items()
+            for name, change in changes.items()
+        ],
+        columns=["variant", "name", "drive", "group", "mean", "change"],
+    )
+    means = {}
+    for names, drives in group_rows(rows, ["variant", "name"]):
+        changes, over = drives["change"], over_drives(drives, confidence)
+        error, base = (
+            float(pd.Series([getattr(change, name) for change in changes], dtype=float).mean())
+            for name in ("ERR", "base_ERR")
+        )
+        means[names] = replace(changes.iloc[0], ERR=error, base_ERR=base, difference=over)
+    return as_corrected(means)
 
 
 def _totals(scores: pd.DataFrame) -> Totals:

@@ -17,6 +17,7 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.thresholds import at_levels
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.tables import KEY, MASK, concatenate, group_rows, is_final, totals
+from roadeval.images.disturbing import Disturbance
 from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, TYPES, UNSCORED
 from roadeval.runtime.text import visible
 
@@ -73,6 +74,12 @@ def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
             (number, mask.variant, oracle, mask.stage, *_numbers(mask))
             for oracle, masks in result.oracles.items()
             for mask in masks
+        ],
+        "disturbances": [
+            (number, disturbance.name, *disturbance, mask.variant, mask.stage, *_numbers(mask))
+            for text, disturbed in result.disturbed.items()
+            for disturbance in [Disturbance.parse(text)]
+            for mask in disturbed.tallies
         ],
         "disagreements": [
             (number, one[0], other[0], *result.changes[*one, *other])

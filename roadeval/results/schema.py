@@ -162,6 +162,15 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         *_COUNTS,
         *_RATES.values(),
     ),
+    "disturbances": (
+        *_IN_FRAME,
+        Column("disturbance", Kind.NAME, "its name, as `fog-2`, `blur-0_5`, `exposure-minus1`"),
+        Column("kind", Kind.NAME, "the kind of the disturbance"),
+        Column("strength", Kind.NUMBER, "its strength; of `jpeg` the quality"),
+        *_MASK,
+        *_COUNTS,
+        *_RATES.values(),
+    ),
     "disagreements": (
         *_IN_FRAME,
         Column("from_variant", Kind.NAME, "variant of the first mask"),
@@ -314,6 +323,7 @@ _ROWS: Final = {
     "frames": "A row per evaluated frame, variant and stage; in a fleet, in a folder per drive.",
     "regions": "A row per evaluated frame, variant, stage and region.",
     "oracles": "A row per evaluated frame, variant, stage replaced by the truth and later stage.",
+    "disturbances": "A row per evaluated frame, disturbance and variant: its final mask then.",
     "disagreements": "A row per evaluated frame and pair of final masks.",
     "unlabelled": "A row per frame without truth and variant: how doubtful its mask is.",
     "edges": "A row per evaluated frame, final mask and place where the road ends, in metres.",

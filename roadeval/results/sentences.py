@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
 from roadeval.data.words import counted, interval, number, percent
+from roadeval.evaluation.score.degradation import Degradations
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
@@ -22,6 +23,13 @@ MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
 """Least difference between errors and stated errors that `describe_overconfidence` reports."""
+_TIMES: Final = {
+    1000.0: ("raises", ""),
+    3.5: ("multiplies", " by {:.0f}"),
+    2.5: ("triples", ""),
+    1.75: ("doubles", ""),
+}
+"""Words for a rise, by the least ratio."""
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
@@ -86,6 +94,28 @@ def correction(differences: Iterable[Difference]) -> str:
         f"{MARK} not chance, even though several are compared (Holm's correction); rows without it "
         "may be chance."
     )
+
+
+def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
+    """Return which disturbance harms the focus most, and how many do; empty without any.
+
+    A variant that was not disturbed gives way to the first one that was.
+    """
+    if not disturbances:
+        return ""
+    variant = focus if focus in disturbances else next(iter(disturbances))
+    changes = [c for c in disturbances[variant].values() if c.difference.mean > 0]
+    if not changes:
+        return f"No disturbance makes {variant} worse."
+    worst = max(changes, key=lambda change: change.difference.mean)
+    base, error = worst.base_ERR or 0.0, worst.ERR or 0.0
+    times = error / base if base else math.inf
+    does, by = next((words for least, words in _TIMES.items() if times >= least), ("raises", ""))
+    ends = f"{percent(base, 1)} to {percent(error, 1)} %"
+    sure = sum(is_significant(change.difference) for change in changes)
+    more = f" {sure} of {len(disturbances[variant])} make it worse beyond chance."
+    most = f"{worst.text} {does} the ERR of {variant}{by.format(times)}: {ends}."
+    return f"{most}{more * bool(sure)}"
 
 
 def misfit(finding: Finding, period_ms: float | None, remedy: str) -> str:

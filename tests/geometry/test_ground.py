@@ -324,3 +324,14 @@ def test_a_plan_shows_the_pixel_in_which_each_cell_lies():
         inside = 0 <= x < SIZE[0] and 0 <= y < SIZE[1]
         assert picture[row, column] == (image[int(y), int(x)] if inside else -5)
     assert (plan.cells == OUTSIDE).any()
+
+
+def test_distances_are_those_of_places_and_roofs_are_before_the_horizon():
+    ground = made(model="plumb_bob", distortion=(-0.1, 0.02, 0, 0))
+    metres = ground.distances()
+    rows, columns = np.mgrid[: ground.height, : ground.width].reshape(2, -1)
+    places = ground.places(np.column_stack([columns, rows]).astype(float))
+    along = np.hypot(*places.T).reshape(metres.shape)
+    assert np.array_equal(np.isnan(along), ~(metres > 0))
+    assert np.allclose(metres[metres > 0], along[metres > 0])
+    assert (metres[0] < 0).all()

@@ -17,7 +17,7 @@ PIXELS: Final = 50
 
 TABLES: Final = {
     **dict.fromkeys(("start", "end", "every", "max_frames", "scale"), "frames"),
-    "max_pixels": "frames",
+    **dict.fromkeys(("max_pixels", "disturb"), "frames"),
     **dict.fromkeys(("masks", "resize_truth", "sync_tolerance_ms", "image", "truth"), "topics"),
     **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors"), "labels"),
     **dict.fromkeys(("model", "gap", "train_frames", "source", "seed"), "training"),

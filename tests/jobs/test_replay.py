@@ -39,7 +39,7 @@ def frames_of(folder: Path) -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def once(drive, tmp_path_factory):
     folder = tmp_path_factory.mktemp("once")
-    return folder, run(drive, folder, jobs=2)
+    return folder, run(drive, folder, jobs=2, disturb=["noise:1", "fog:2"])
 
 
 def test_training_frames_of_the_drive_itself_are_left_out_and_warned_of(drive, tmp_path):

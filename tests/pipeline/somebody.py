@@ -42,6 +42,12 @@ def fails_on_13(image, moment):
     return lower_half(image)
 
 
+def fails_in_the_dark(image):
+    if image.mean() < 20:
+        raise ValueError("dark")
+    return lower_half(image)
+
+
 def always_fails(image):
     raise KeyError("weights")
 

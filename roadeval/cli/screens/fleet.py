@@ -13,7 +13,8 @@ from roadeval.cli import console
 from roadeval.cli.options import FLAGS
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
-from roadeval.report.blocks import Heading
+from roadeval.report.blocks import Block, Heading
+from roadeval.report.sections import disturbances
 from roadeval.report.sections.drives import by_reason, drives_table
 from roadeval.report.sections.summary import drives_account
 from roadeval.report.tables import differences_table, rates_table
@@ -42,8 +43,9 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         out.print(f"{earlier} of them were done before.")
     out.print()
     if facts.totals:
-        blocks = [rates_table(facts)]
+        blocks: list[Block] = [rates_table(facts)]
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
+        blocks += disturbances.brief(facts)
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show(
             [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],

@@ -17,6 +17,7 @@ from roadeval.data.words import counted, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
+from roadeval.report.sections import disturbances
 from roadeval.report.sections.ground import distance_table
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
@@ -70,6 +71,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
             yield Text(legend)
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
+    yield from disturbances.brief(facts)
     if metres:
         yield distance_table(metres, [*facts.finals], brief=True)
 

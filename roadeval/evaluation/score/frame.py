@@ -73,13 +73,19 @@ def score_frame(
         return _evaluate(result, truth, settings, prior, ground)
     if role is not Role.PICKED:
         return result
-    finals = {(v.variant, FINAL_STAGE): Packed.of(v.final()) for v in variants}
+    scored = score_finals(result, truth)
+    apart = {final.variant: final.rates["ERR"] for final in scored.tallies}
+    return replace(scored, tallies=(), apart=apart)
+
+
+def score_finals(result: FrameResult, truth: Truth) -> FrameResult:
+    """Return a frame's result with the counts and errors of its final masks alone."""
+    finals = {(v.variant, [*v.masks()][-1][0]): Packed.of(v.final()) for v in result.variants}
     bits = TruthBits.of(truth)
-    tallies = tally([*finals], bits.bits_of(finals.values()), bits)
     return replace(
         result,
-        apart={final.variant: final.rates["ERR"] for final in tallies},
-        errors={v.variant: error_map(v.final(), truth) for v in variants},
+        tallies=tuple(tally([*finals], bits.bits_of(finals.values()), bits)),
+        errors={v.variant: error_map(v.final(), truth) for v in result.variants},
     )
 
 

@@ -40,6 +40,7 @@ from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
+from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
 from roadeval.evaluation.score.metre_sums import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
@@ -241,6 +242,7 @@ class Scoreboard:
         self._health = defaultdict[str, Counter[str]](Counter)
         self._counts = CountedRows("variant", "stage")
         self._oracles = CountedRows("variant", "oracle", "stage")
+        self._disturbed = CountedRows("disturbance", "variant", "stage")
         self.heat = defaultdict[str, HeatMap](HeatMap)
         """The places where each variant's final mask errs."""
         self.changes = defaultdict[Transition, Change](Change)
@@ -285,6 +287,9 @@ class Scoreboard:
         for oracle, tallies in result.oracles.items():
             names = (((t.variant, oracle, t.stage), t.counts) for t in tallies)
             self._oracles.add(place, names)
+        for name, disturbed in result.disturbed.items():
+            finals = (((name, t.variant, t.stage), t.counts) for t in disturbed.tallies)
+            self._disturbed.add(place, finals)
         for name, layer in result.errors.items():
             self.heat[name].add(layer.array.astype(np.uint8, copy=False))
         for step, change in result.changes.items():
@@ -340,17 +345,19 @@ class Scoreboard:
             for variant, stages in tables.as_trees(tables.totals(rows)).items():
                 replaced.setdefault(variant, {})[oracle] = stages
         windows = tables.windows(frames, settings.window)
+        disturbed = self._disturbed.table(self._frames_added(), {})
         parts = {
             "totals": tables.as_trees(tables.totals(frames)),
             "beyond": beyond,
             **({"curves": curves} if curves else {}),
             "oracles": replaced,
+            "disturbances": degradations(disturbed, frames, settings),
             "windows": -(-len(self._when) // (2 * settings.window)),
             "claims": evidence(windows, settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
         }
-        return DriveSums(frames, windows, drive_effects(frames, settings), parts)
+        return DriveSums(frames, windows, drive_effects(frames, settings), parts, disturbed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,6 +369,8 @@ class DriveSums:
     effects: Sequence[Effect]
     parts: Mapping[str, Any]
     """The parts of ``summary.json`` that the evaluation knows."""
+    disturbed: pd.DataFrame
+    """The counts of final masks of disturbed frames."""
 
     @property
     def times(self) -> dict[str, int]:

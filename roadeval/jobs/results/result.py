@@ -466,6 +466,7 @@ def number_settings(run: Mapping[str, Any]) -> dict[str, Any]:
             continue
         nested = values.items() if isinstance(values, dict) else [("", values)]
         settings |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
+    settings.pop("frames.disturb", None)
     return settings
 
 

@@ -11,7 +11,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -19,13 +19,14 @@ from typing import Any, Final, Protocol
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
 from roadeval.config.variants import Variant
-from roadeval.data import Calibration, FrameResult, Role, VariantLayout
+from roadeval.data import Calibration, Frame, FrameResult, Role, VariantLayout, VariantResult
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score.fit import FitCheck
-from roadeval.evaluation.score.frame import BlindPrior
+from roadeval.evaluation.score.frame import BlindPrior, score_finals
 from roadeval.evaluation.score.scoreboard import Scoreboard
+from roadeval.images.disturbing import Disturbance, Light
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run.frame import bind, external_layout, external_variant, run_variant
 from roadeval.logs.errors import FrameError
@@ -138,6 +139,17 @@ class Run:
     failures: Failures = field(default_factory=Failures)
     """The frames on which a stage failed, so far."""
 
+    @cached_property
+    def disturbed_variants(self) -> tuple[str, ...]:
+        """The variants that run on disturbed frames: those without masks from elsewhere."""
+        return tuple(v.name for v in self.variants if "given" not in v.pipeline.settings)
+
+    @cached_property
+    def depth(self) -> Light | None:
+        """The metres to the ground at each pixel, if the camera is known."""
+        ground = self.selection.ground_as_read
+        return ground.distances().astype("float32") if ground else None
+
     @property
     def key(self) -> Key:
         """Drive and camera, the first cells of every row of its tables."""
@@ -164,6 +176,8 @@ class Run:
         self.fit.add(frame, final_masks)
         if done.result.role in TRIED:
             self.failures.first = None
+        for failure in done.failures:
+            self.failures.add(failure)
         lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
         return replace(done, lines={**done.lines, **lines})
 
@@ -180,6 +194,11 @@ class Run:
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
+            disturbed={
+                Disturbance.parse(text).name: self.disturbed_variants
+                for text in self.config.frames.disturb
+                if self.selection.truth
+            },
             focus=self.board.unlabelled.focus,
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
@@ -373,6 +392,8 @@ class ProcessedFrame:
     result: FrameResult
     lines: Mapping[str, str]
     encoded: Any
+    failures: Sequence[Failure] = ()
+    """The variants that failed on its disturbed images."""
 
 
 def process(
@@ -455,8 +476,34 @@ def _process(
         if name not in run.chains
     ]
     result = run.board.score(frame, role, tuple(variants))
-    result = replace(result, notes=notes_of(result.tallies))
+    disturbed, failures = _disturb(run, frame) if role is Role.EVALUATED else ({}, [])
+    result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
-    return run, ProcessedFrame(position, result.without_layers(), lines, encoded)
+    return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)
+
+
+def _disturb(run: Run, frame: Frame) -> tuple[dict[str, FrameResult], list[Failure]]:
+    """Run the chains on a frame's disturbed images; return the scored final masks, and failures."""
+    results, failures = dict[str, FrameResult](), list[Failure]()
+    assert frame.truth is not None
+    for text in run.config.frames.disturb:
+        image = Disturbance.parse(text).of(frame.image, frame.number, run.depth)
+        view, shared, variants = View.of(image, frame.moment), dict[Any, Any](), []
+        for name in run.disturbed_variants:
+            try:
+                *_, last = (s for s in run.chains[name].run(view, shared) if s.output.mask)
+            except StageError as error:
+                where = "".join(traceback.format_exception(error))
+                reason = Sentence("{}: {}", text, error.sentence)
+                failures.append(Failure(frame.number, Role.EVALUATED, name, reason, where))
+                continue
+            layers = tuple(a for a in last.output.layers if a.spec.name == last.stage)
+            last = replace(last, output=replace(last.output, layers=layers))
+            variants.append(VariantResult(name, (last,)))
+        # Its file is the undisturbed image's, and its truth is recorded there.
+        bare = replace(frame, image=image, media_type=None, truth=None, shadow_truth=None)
+        result = FrameResult(bare, Role.EVALUATED, tuple(variants))
+        results[text] = score_finals(result, frame.truth)
+    return results, failures

@@ -186,8 +186,9 @@ def _finish_recording(
         return ended[0].facts
     by_camera = {run.camera: end for run, end in zip(runs, ended, strict=True)}
     frames = concatenate([end.sums.frames for end in ended])
+    disturbed = concatenate([end.sums.disturbed for end in ended])
     camera_facts = {name: end.facts for name, end in by_camera.items()}
-    facts = summary.join_cameras(frames, camera_facts, results.tables)
+    facts = summary.join_cameras(frames, disturbed, camera_facts, results.tables)
     # The seconds differ from run to run, see `_recorded_texts`.
     steady = {name: replace(facts, seconds={}) for name, facts in camera_facts.items()}
     recorded = replace(facts, run=deciding(config).as_dict(), cameras=steady)

@@ -14,8 +14,10 @@ import numpy as np
 
 from roadeval.config.variants import AS_IT_IS
 from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
+from roadeval.data.words import listing
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.fit import LAST_LAG, TRUTH, Finding, FitCheck, Misfit
 from roadeval.evaluation.score.scoreboard import DriveSums, drive_effects
 from roadeval.evaluation.score.unlabelled import Unlabelled
@@ -213,7 +215,10 @@ def _best_thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def join_cameras(
-    frames: pd.DataFrame, cameras: Mapping[str, Facts], stated: dict[str, TableFacts]
+    frames: pd.DataFrame,
+    disturbed: pd.DataFrame,
+    cameras: Mapping[str, Facts],
+    stated: dict[str, TableFacts],
 ) -> Facts:
     """Return the facts of a rig: of its cameras together, each of which counts the same."""
     first, *_ = cameras.values()
@@ -245,6 +250,7 @@ def join_cameras(
         curves={},
         thresholds={},
         oracles={},
+        disturbances=degradations(disturbed, frames, first.evaluation),
         seconds={},
         examples=[],
         training=TrainingFacts(first.training.source, model=first.training.model),
@@ -292,6 +298,7 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
     yield from _network_warnings(run)
     yield from _tuning_warnings(run)
     yield from _mask_warnings(run, totals)
+    yield from _disturbance_warnings(run) if run.config.frames.disturb else ()
     yield from _training_warnings(run)
     yield from _pick_warnings(run)
     yield from _constant_warnings(totals)
@@ -436,6 +443,16 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
     yield from run.frames.unpaired()
 
 
+def _disturbance_warnings(run: Run) -> Iterator[str]:
+    """Yield what could not be disturbed."""
+    names = [v.name for v in run.layouts if v.name not in run.disturbed_variants]
+    if not run.selection.truth:
+        yield Sentence("{frames.disturb}: nothing is disturbed without truth to score against")
+    elif names:
+        why = "whose masks were made of the images as they are"
+        yield Sentence("{frames.disturb}: not for {}, {}", listing(names), why)
+
+
 def _mask_facts(run: Run) -> dict[str, Any]:
     """State where labels lie that are not in the log, and how many frames have one."""
     masks, seen = {}, run.frames.accounting
@@ -482,7 +499,7 @@ def _account_for_frames(run: Run) -> FrameAccount:
         "outside the range": seen.in_log - seen.in_range,
         f"not read ({'no truth, ' * labelled}stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
-        "failed in a stage": len(run.failures),
+        "failed in a stage": seen.read - len(seen.undecodable) - sum(roles.values()),
         "trained on": roles[Role.TRAINING],
         "equal to a training frame": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],

@@ -1,0 +1,85 @@
+"""How the variants stand disturbances: a sentence, a chart, and tables of ERR."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from roadeval.data.words import in_percent, number, percent, points
+from roadeval.evaluation.metrics import TESTED
+from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, Table, Text
+from roadeval.report.captions import caption, note
+from roadeval.report.chart import Chart, ChartKind, looks
+from roadeval.report.charts.standard import series
+from roadeval.report.findings import Findings
+from roadeval.report.tables import variant_cell
+from roadeval.results.facts import Facts, FleetFacts
+from roadeval.results.fleet import FleetFolder
+from roadeval.results.sentences import correction, describe_disturbances, marked_interval
+
+
+def section(findings: Findings | FleetFolder) -> Iterator[Block]:
+    """Yield ERR under each disturbance; nothing if there was none."""
+    facts = findings.facts
+    if not facts.disturbances:
+        return
+    yield Heading("How it stands disturbances")
+    yield Text(describe_disturbances(facts.disturbances, facts.focus))
+    by_variant, columns = looks([*facts.finals]), errors_by_variant(facts)
+    names = [*next(iter(columns.values()))]
+    marks = [
+        series(name, by_variant[name], range(len(names)), [*map(in_percent, errors.values())])
+        for name, errors in columns.items()
+    ]
+    chart = Chart("ERR by disturbance", ChartKind.MARKS, marks, names)
+    yield Figure([chart], caption("disturbances"))
+    yield Details("Every disturbance in numbers", [_table(facts), note("disturbance intervals")])
+
+
+def errors_by_variant(facts: Facts | FleetFacts) -> dict[str, dict[str, float | None]]:
+    """Return each variant's ERR without a disturbance, ``none``, and by each one's text."""
+    columns: dict[str, dict[str, float | None]] = {}
+    texts = [c.text for changes in facts.disturbances.values() for c in changes.values()]
+    for name, changes in facts.disturbances.items():
+        columns[name] = {"none": facts.totals[name][facts.finals[name]][TESTED]}
+        columns[name] |= dict.fromkeys(texts) | {c.text: c.ERR for c in changes.values()}
+    return columns
+
+
+def brief(facts: Facts | FleetFacts) -> Iterator[Block]:
+    """Yield what a terminal shows: ERR by disturbance and variant, and the sentence."""
+    if columns := errors_by_variant(facts):
+        cells = zip(*(map(percent, errors.values()) for errors in columns.values()), strict=True)
+        names = next(iter(columns.values()))
+        rows = [[text, *row] for text, row in zip(names, cells, strict=True)]
+        legend = caption("disturbances")
+        yield Table(["disturbed by", *columns], rows, text_columns=(0,), caption=legend, small=True)
+        yield Text(describe_disturbances(facts.disturbances, facts.focus))
+
+
+def _table(facts: Facts | FleetFacts) -> Table:
+    rows: list[list[Cell | str]] = []
+    breaks, family = [], []
+    for variant, changes in facts.disturbances.items():
+        breaks.append(len(rows))
+        for place, change in enumerate(changes.values()):
+            family.append(change.difference)
+            rows.append(
+                [
+                    "" if place else variant_cell(variant, [*facts.finals]),
+                    change.text,
+                    *map(percent, (change.base_ERR, change.ERR)),
+                    points(change.difference.mean),
+                    marked_interval(change.difference),
+                    number(change.difference.better or 0),
+                    number(change.difference.worse or 0),
+                ]
+            )
+    return Table(
+        ["variant", "disturbed by", "from, %", "to, %", "pp", "interval", "better", "worse"],
+        rows,
+        text_columns=(0, 1),
+        breaks=breaks[1:],
+        groups=[("", 2), ("ERR", 4), (family[0].unit, 2)],
+        caption=correction(family),
+        small=True,
+    )
