@@ -9,8 +9,10 @@ from roadeval.data.arrays import Packed, TruthBits, everywhere, ones, pack, unpa
 from roadeval.data.calibration import Calibration, Mounting
 from roadeval.data.frame import (
     IGNORE,
+    NO_CLASS,
     NON_ROAD,
     ROAD,
+    Classes,
     Frame,
     Histogram,
     Mask,
@@ -19,6 +21,7 @@ from roadeval.data.frame import (
     Rgb,
     Role,
     Truth,
+    TruthClass,
 )
 from roadeval.data.histogram import CERTAIN, CODES, best_code, histogram, wrong_above
 from roadeval.data.layer import (

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +19,26 @@ Truth = npt.NDArray[np.uint8]
 """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
 Probability = npt.NDArray[np.uint16]
 """``(H, W)`` uint16: codes 0..65535 that span 0..1."""
+Classes = npt.NDArray[np.uint8]
+"""``(H, W)`` uint8: codes of the truth's classes; `NO_CLASS` for none."""
 Histogram = npt.NDArray[np.uint32]
 """``(2, 65536)`` uint32: non-road and road pixels by the code of their probability."""
 
 NON_ROAD: Final = 0
 ROAD: Final = 1
 IGNORE: Final = 255
+NO_CLASS: Final = 255
+
+
+class TruthClass(NamedTuple):
+    """A class of the truth's labels."""
+
+    value: int
+    """The label's value, or its colour as red * 65536 + green * 256 + blue."""
+    name: str
+    """Its name; empty if it is not known."""
+    truth: str
+    """``road``, ``other`` or ``ignored``."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +73,8 @@ class Frame:
     """Probabilities of road, from which thresholds make masks of other systems."""
     camera: str = ""
     """The image topic."""
+    classes: Classes | None = None
+    """The classes of the truth's pixels, by their codes; None if the truth has no classes."""
 
     @property
     def moment(self) -> Moment:

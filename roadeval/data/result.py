@@ -239,6 +239,9 @@ class FrameResult:
     above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     apart: Mapping[str, float] = field(default_factory=dict)
     """ERR by variant of a frame that was labelled because it was in doubt; no total counts it."""
+    classes: Mapping[str, Sums] = field(default_factory=dict)
+    """``(256, 3)`` by variant, a row for each code of `Frame.classes`: its pixels, those called
+    road, and the missed road beside it. Empty if the truth has no classes."""
 
     def without_layers(self) -> FrameResult:
         """Return the result without layers, which take most memory."""

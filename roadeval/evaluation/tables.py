@@ -318,6 +318,41 @@ def by_region(rows: pd.DataFrame) -> pd.DataFrame:
     return rates_of(sums, metrics.SHORT).join(sums[["pixels", "errors"]] / frame)
 
 
+def by_class(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the part of each class in the errors of one mask, from rows of ``classes``.
+
+    The classes' names for people are the index. Columns are ``truth``; ``pixels``, the share of all
+    pixels that count, ``of_other``, that of non-road, and ``road``, the share of its own pixels
+    that is called road; ``false``, its share of the false road, and ``missed``, the share of the
+    missed road that lies beside it; and ``worst``, frames of the first drive. Shares are means over
+    drives; the greatest part of the false road comes first.
+    """
+    numbers = "class " + rows["class"].astype(str)
+    names = rows["name"].astype(str)
+    names = names.where(names != "", numbers)
+    is_road, is_other = rows["truth"] == "road", rows["truth"] == "other"
+    parts = rows.assign(
+        drive=rows["drive"].astype(str),
+        name=names,
+        all=rows["pixels"],
+        pixels=rows["pixels"].where(is_road | is_other, 0),
+        of_other=rows["pixels"].where(is_other, 0),
+        false=rows["road"].where(is_other, 0),
+        missed=rows["beside"],
+        lost=(rows["pixels"] - rows["road"]).where(is_road, 0),
+    )
+    counts = ["pixels", "of_other", "road", "false", "missed", "all", "lost"]
+    sums = parts.groupby(["drive", "name"], sort=False)[counts].sum()
+    drives = sums.groupby("drive", sort=False).sum()
+    shares = sums.div(drives.assign(missed=drives["lost"]), level="drive")
+    by_name = shares.assign(road=sums["road"] / sums["all"]).groupby("name", sort=False)
+    means = by_name.sum() / (drives.assign(missed=drives["lost"]) > 0).sum()
+    first = parts.astype({"truth": str, "worst": str}).groupby("name", sort=False).first()
+    table = means.assign(road=by_name["road"].mean(), truth=first["truth"], worst=first["worst"])
+    table = table.sort_values(["false", "missed"], ascending=False, kind="stable")
+    return table.drop(columns=["all", "lost"])
+
+
 def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Yield the mean rates of final masks when a stage is replaced by the truth.
 

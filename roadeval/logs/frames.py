@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import ROAD, Calibration, Frame
+from roadeval.data import ROAD, Calibration, Frame, TruthClass
 from roadeval.data.words import first_of
 from roadeval.geometry.ground import Ground, ground_of
 from roadeval.images.decoding import orientation_of
@@ -27,9 +27,11 @@ from roadeval.logs.topics.calibration import calibration_of, is_rectified
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.meaning import (
+    ClassMap,
     Labels,
     LabelSource,
     check_size,
+    class_names,
     meaning_of,
     read_or_error,
     samples,
@@ -90,6 +92,12 @@ class Selection:
     def truth(self) -> LabelSource | None:
         """Road truth."""
         return self.labels.get(TRUTH)
+
+    @property
+    def classes(self) -> list[TruthClass]:
+        """The classes of the truth that have occurred, in the order of `Frame.classes`' codes."""
+        meaning = self.truth.meaning if self.truth else None
+        return meaning.classes if isinstance(meaning, ClassMap) else []
 
     @property
     def shadow(self) -> LabelSource | None:
@@ -213,7 +221,8 @@ def settle(
             check_size(label_topic.size, reader, 0, camera, pairing)
             values = MaskSettings(labels=config.labels if is_truth else LabelSettings())
             shown = "shadow" if name == SHADOW else "road"
-            meaning = meaning_of(reader, values, shown=shown)
+            names = class_names(reader.name, topics, readers) if is_truth else {}
+            meaning = meaning_of(reader, values, shown=shown, names=names)
             labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
     calibration = calibration_of(image, topics, readers)
     if any(calibration) and image.turned != 1 and camera.images.limits.turn:
@@ -439,6 +448,7 @@ class LoggedFrame:
             # A mask has no third value.
             {name: (label.truth == ROAD).astype(np.uint8) for name, label in labels.items()},
             {n: label.probability for n, label in labels.items() if label.probability is not None},
+            classes=None if truth is None else truth.classes,
         )
 
     def _label(self, name: str, *sizes: tuple[int, int]) -> Labels:
@@ -456,12 +466,14 @@ class LoggedFrame:
         theirs, resize = label.truth.shape[1::-1], camera.resize_labels
         if problem := size_problem(place, theirs, "its image", sizes[0], resize=resize):
             raise FrameError(problem)
-        truth, codes = label.truth, label.probability
+        truth, classes, codes = label.truth, label.classes, label.probability
+        how = cv2.INTER_NEAREST_EXACT
         for size in sizes:
             if truth.shape[1::-1] != size:
-                truth = _resized(truth, size, cv2.INTER_NEAREST_EXACT)
-                codes = None if codes is None else _resized(codes, size, cv2.INTER_NEAREST_EXACT)
-        return Labels(truth, codes)
+                truth = _resized(truth, size, how)
+                classes = None if classes is None else _resized(classes, size, how)
+                codes = None if codes is None else _resized(codes, size, how)
+        return Labels(truth, classes, codes)
 
 
 class FrameStream:

@@ -33,7 +33,12 @@ from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.label_files import labels_in
-from roadeval.logs.truth.meaning import LabelSource, log_and_topic, source_beside_log
+from roadeval.logs.truth.meaning import (
+    LabelSource,
+    class_names,
+    log_and_topic,
+    source_beside_log,
+)
 from roadeval.logs.truth.named_labels import find_keys, shown_name
 from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import visible
@@ -275,7 +280,9 @@ class Log:
         reader = other.readers[named(other.topics, topic, "truth.path").name]
         name = "" if other.path.resolve() == self.path.resolve() else other.name
         return source_beside_log(
-            reader, settings, camera, lambda: other.digest, name, offset_ms=offset_ms
+            *(reader, settings, camera, lambda: other.digest, name),
+            offset_ms=offset_ms,
+            names=class_names(reader.name, other.topics, other.readers),
         )
 
     def for_camera(self, config: LogConfig) -> Log:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from annotated_types import Interval, Len
 
@@ -86,6 +86,8 @@ Name = Annotated[str, Len(1, 200)]
 Level = Annotated[int, Interval(ge=0, le=255)]
 Color = tuple[Level, Level, Level]
 """Red, green and blue, 0..255 each."""
+_LABEL: Final = re.compile(r"-?\d{1,5}|\d{1,3},\d{1,3},\d{1,3}")
+"""A label's value or colour, as a key of TOML."""
 
 
 @dataclass(frozen=True)
@@ -149,15 +151,23 @@ class LabelSettings:
     ignore: Truth values, or names of classes, that are not counted.
     road_colors: Truth colours that mean road, as red, green and blue.
     ignore_colors: Truth colours that are not counted.
+    names: Names of classes by their values, or by their colours as ``"64,32,32"``; labels can be
+        called by them. Default: those of a ``vision_msgs/LabelInfo`` beside the labels' topic.
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
     ignore: Annotated[tuple[Value | Name, ...], Flag("--ignore-label", "V|NAME")] = ()
     road_colors: Annotated[tuple[Color, ...], Flag("--road-color", "R,G,B")] = ()
     ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
+    names: Mapping[str, Name] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
+        kinds = {key.count(",") for key in self.names if _LABEL.fullmatch(key)}
+        if self.names and (len(kinds) != 1 or not all(map(_LABEL.fullmatch, self.names))):
+            raise SettingError("its keys must all be values, or all colours", setting="names")
+        numbers = any(isinstance(label, int) for label in (*self.road, *self.ignore))
+        mixed = (self.road or self.ignore) and (self.road_colors or self.ignore_colors)
+        if mixed or (numbers and self.by_color):
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
             raise SettingError(
@@ -171,6 +181,42 @@ class LabelSettings:
             )
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
+
+    @property
+    def by_color(self) -> bool:
+        """Whether labels are colours."""
+        return bool(self.road_colors) or any("," in key for key in self.names)
+
+    def with_values(
+        self, where: str, names: Mapping[str, str] | None = None, classes: Collection[str] = ()
+    ) -> LabelSettings:
+        """Return the settings with the values, or colours, of classes that they call by name.
+
+        ``names`` are further names by value, which the log tells; ``classes`` are names that stand
+        in the labels themselves. A `LogError` if there are names, but a class is none of them.
+        """
+        names = {**(names or {}), **self.names}
+        parts: dict[str, list[Any]] = {"road": [], "ignore": []}
+        for setting, chosen in parts.items():
+            for label in getattr(self, setting):
+                values = [key for key, name in names.items() if name == label]
+                unknown = not values and isinstance(label, str) and not classes
+                if unknown and names:
+                    problem = f"{label} is none of the classes of {where}"
+                    remedy = f"these are {', '.join(dict.fromkeys(names.values()))}"
+                    raise LogError(problem, setting=f"labels.{setting}", remedy=remedy)
+                chosen.extend([label] if label in classes or not values else values)
+        if any("," in str(label) for label in parts["road"]):
+            colors = {
+                f"{setting}_colors": tuple(tuple(map(int, label.split(","))) for label in labels)
+                for setting, labels in parts.items()
+            }
+            return replace(self, road=(), ignore=(), names=names, **colors)  # type: ignore[arg-type]
+        road, ignore = (
+            tuple(int(label) if str(label) in names else label for label in labels)
+            for labels in parts.values()
+        )
+        return replace(self, road=road, ignore=ignore, names=names)
 
 
 @dataclass(frozen=True)

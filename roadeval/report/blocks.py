@@ -129,6 +129,8 @@ class Cell(Block):
     """Whether it is the best of its column, or of its row."""
     look: Look | None = None
     """The look of its variant in charts, whose mark stands before the text."""
+    frames: Sequence[int] = ()
+    """The frames whose numbers the text is; on a page they are links to the frames."""
 
 
 @dataclass(frozen=True)

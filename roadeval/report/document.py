@@ -14,6 +14,7 @@ from roadeval.data.words import number
 from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
 from roadeval.report.sections import (
+    classes,
     disturbances,
     drive,
     drives,
@@ -29,8 +30,10 @@ from roadeval.results.fleet import FleetFolder
 ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
 Section = Callable[[Any], Iterable[Block]]
+WHY: Final = (classes.section, disturbances.section)
+"""The sections on what goes wrong, of a drive or of many."""
 SCORED: Final = (
-    *(drive.filter_effect, drive.regions, ground.on_the_ground, disturbances.section),
+    *(drive.filter_effect, drive.regions, *WHY, ground.on_the_ground),
     *(drive.stages, drive.thresholds),
 )
 """The sections of a drive with truth; without truth there is one on its masks."""
@@ -41,9 +44,8 @@ RIG: Final = (rig.cameras, drive.filter_effect, disturbances.section, rig.each_c
 def document(findings: Findings | FleetFolder) -> Report:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFolder):
-        parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
-        parts = (*parts, disturbances.section, drives.missing, drives.worst)
-        return _compose(findings, *parts, provenance.of_drives)
+        parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions, *WHY)
+        return _compose(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
     # Frames fill pages, so they come late.
@@ -67,7 +69,7 @@ def page_document(
         along = partial(drives.along, most=worst_frames, beside=folder)
         worst = partial(drives.worst, across=ACROSS, most=worst_frames)
         parts: tuple[Section, ...] = (drives.table, along, worst, drives.plots, drives.strata)
-        parts = (*parts, drive.regions, disturbances.section, drives.missing)
+        parts = (*parts, drive.regions, *WHY, drives.missing)
         return _compose(findings, *parts, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)

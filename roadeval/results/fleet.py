@@ -79,8 +79,9 @@ OF_A_DRIVE: Final = 3
 """Frames of a drive that are among its worst, at most."""
 APART_NS: Final = 3_000_000_000
 """Neighbours fail alike: of frames less than this apart only the worst counts."""
-CACHED: Final = ("frames", "regions", "scores", "worst")
-"""Tables of each drive that are cached in folders of these names; ``regions`` of final masks."""
+CACHED: Final = ("frames", "regions", "scores", "worst", "classes")
+"""Tables of each drive that are cached in folders of these names; ``regions`` of final masks. Older
+fleets have no ``classes``."""
 
 
 def results_path(folder: Path, drive: str) -> Path:
@@ -195,6 +196,7 @@ class FleetFolder:
         chosen = [drive for drive in scored if drives is None or drive in drives]
         if name in CACHED:
             paths = [cached_path(self.path, name, drive) for drive in chosen]
+            paths = [path for path in paths if name != "classes" or path.is_file()]
             return read_parquet(paths, name)[[*TABLES[name].names]]
         folders = (ResultsFolder(results_path(self.path, drive)) for drive in chosen)
         tables = (
@@ -322,6 +324,7 @@ def cache(folder: Path, drive: str) -> None:
     rows = {
         "frames": frames,
         "regions": tables.finals(regions),
+        "classes": of_drive(results, "classes", drive),
         "scores": table_of_scores(frames, regions, beyond_masks(results.facts, key)),
         "worst": _frames_with_pictures(
             folder, drive, only(frames, final=True, variant=results.facts.focus)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import Doubt, Frame, FrameResult, Tally
+from roadeval.data import Doubt, Frame, FrameResult, Tally, TruthClass
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.thresholds import at_levels
 from roadeval.evaluation.score.unlabelled import SIGNS
@@ -43,11 +43,7 @@ class Key(NamedTuple):
 
     def cells(self) -> str:
         """Return both as cells of CSV, with a comma behind each."""
-        cells = ""
-        for text in map(visible, self):
-            escaped = text.replace('"', '""')
-            cells += f'"{escaped}",' if set(text) & {",", '"'} else f"{text},"
-        return cells
+        return "".join(f"{_cell(text)}," for text in self)
 
 
 def doubt_rows(frame: Frame, doubts: Iterable[Doubt]) -> dict[str, list[Row]]:
@@ -100,8 +96,10 @@ def _numbers(tally: Tally) -> Row:
     return *tally.counts, tally.counts.n, *tally.rates.values()
 
 
-def sum_rows(board: Scoreboard, windows: pd.DataFrame) -> dict[str, list[Row]]:
-    """Return the rows of each table of sums over the drive.
+def sum_rows(
+    board: Scoreboard, windows: pd.DataFrame, classes: Sequence[TruthClass] = ()
+) -> dict[str, list[Row]]:
+    """Return the rows of each table of sums over the drive; ``classes`` are those of its truth.
 
     Cells of heat maps that are never labelled, and levels of probabilities that do not occur, are
     left out.
@@ -123,6 +121,7 @@ def sum_rows(board: Scoreboard, windows: pd.DataFrame) -> dict[str, list[Row]]:
         "changes": [(*step, *change) for step, change in board.changes.items()],
         "heat": heat,
         "probabilities": probabilities,
+        "classes": [*board.classes.rows(classes)],
         "metres": [tuple(row.values()) for row in board.metres()],
     }
 
@@ -138,7 +137,11 @@ def csv_lines(key: Key, rows: Mapping[str, Iterable[Row]]) -> dict[str, str]:
 
 
 def _cell(value: str | int | float) -> str:
-    """Return the shortest decimal that reads back as the same number."""
+    """Return a text, or the shortest decimal that reads back as the same number."""
+    if isinstance(value, str):
+        text = visible(value)
+        escaped = text.replace('"', '""')
+        return f'"{escaped}"' if "," in text or '"' in text else text
     return "" if isinstance(value, float) and math.isnan(value) else str(value)
 
 

@@ -226,6 +226,24 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
         Column("road", Kind.COUNT, "labelled road pixels of the drive at this level", "pixels"),
         Column("other", Kind.COUNT, "labelled non-road pixels", "pixels"),
     ),
+    "classes": (
+        *KEY,
+        _VARIANT,
+        Column("class", Kind.COUNT, "the label's value; of a colour red, green and blue in bytes"),
+        Column("name", Kind.TEXT, "its name, if known"),
+        Column("truth", Kind.NAME, "`road`, `other` or `ignored`"),
+        Column("pixels", Kind.COUNT, "pixels of the class", "pixels"),
+        Column("road", Kind.COUNT, "of these, pixels that the final mask calls road", "pixels"),
+        Column(
+            "beside",
+            Kind.COUNT,
+            "missed road whose nearest non-road is of this class, and lies within a 75th of the "
+            "image's diagonal",
+            "pixels",
+        ),
+        Column("frames", Kind.COUNT, "evaluated frames that have the class"),
+        Column("worst", Kind.TEXT, "frames with most of its false or missed road, a second apart"),
+    ),
     "metres": (
         *KEY,
         _VARIANT,
@@ -331,6 +349,7 @@ _ROWS: Final = {
     "changes": "A row per mask and the one before: stage to stage, final mask to final mask.",
     "heat": "A row per variant and square cell of the image: where the final mask errs.",
     "probabilities": "A row per variant, stage and level of its road probability, for curves.",
+    "classes": "A row per final mask and class of the truth, where the truth has classes.",
     "metres": "A row per final mask and measure on the ground; see the how-to on metres.",
     "drives": "A row per drive and camera, scored or not; a column `tag_<key>` for each tag.",
     "scores": "A row per drive, camera, variant, stage and region.",

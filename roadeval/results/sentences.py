@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
 from roadeval.data.words import counted, interval, number, percent
@@ -12,8 +12,12 @@ from roadeval.evaluation.score.degradation import Degradations
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
+from roadeval.evaluation.tables import by_class, only
 from roadeval.results.facts import FrameAccount
 from roadeval.runtime.sentence import Sentence
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FINE: Final = 0.005
 """Levels that differ by less have two digits."""
@@ -166,6 +170,37 @@ def describe_overconfidence(curves: Mapping[str, Mapping[str, Mapping[str, Any]]
                 f"{variant} is over-confident: by its probabilities {percent(stated, 1)} % of the "
                 f"pixels are wrong, and {percent(wrong, 1)} % are."
             )
+
+
+NAMED: Final = 3
+"""Most classes that a sentence names."""
+LEAST_WRONG: Final = 0.001
+"""Less false road, or missed road, than this share of the pixels makes no sentence."""
+
+
+def describe_classes(classes: pd.DataFrame, variant: str) -> Iterator[str]:
+    """Yield which classes the false road of a variant is, and which lie beside its missed road.
+
+    ``classes`` are the rows of the table of that name, of any number of drives.
+    """
+    rows = only(classes, variant=variant)
+    is_other = rows["truth"] == "other"
+    counted_rows = rows[rows["truth"] != "ignored"]
+    missed = counted_rows["pixels"] - counted_rows["road"]
+    wrong = {
+        "false": rows["road"][is_other].sum(),
+        "missed": missed[counted_rows["truth"] == "road"].sum(),
+    }
+    drives = rows["drive"].nunique()
+    over = f" (mean of {drives} drives)" if drives > 1 else ""
+    for kind, verb, word in (("false", "is", ""), ("missed", "lies beside", "beside ")):
+        if wrong[kind] < max(1, LEAST_WRONG * counted_rows["pixels"].sum()):
+            continue
+        shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
+        (first, most), *others = shares.head(NAMED).items()
+        more = [f"{percent(share, 0)} % {word}{name}" for name, share in others if share >= 0.1]
+        parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}", *more]
+        yield f"{', '.join(parts)}{over}."
 
 
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Lines of tables, and facts, as a replay writes them."""
 
+from roadeval.data import TruthClass
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
 from roadeval.results.schema import TABLES
@@ -12,8 +13,15 @@ def lines(result):
     return csv_lines(KEY, frame_rows(result))
 
 
+CLASSES = [
+    TruthClass(3, "road", "road"),
+    TruthClass(4, "", "other"),
+    TruthClass(8, 'a, "b"', "other"),
+]
+
+
 def sum_lines(board, windows):
-    return csv_lines(KEY, sum_rows(board, windows))
+    return csv_lines(KEY, sum_rows(board, windows, CLASSES))
 
 
 def frames_of(results):

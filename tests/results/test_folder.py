@@ -46,7 +46,9 @@ def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResu
     graded = replace(stage.output, probability=MASK.astype(np.uint16) * 40_000)
     variant = replace(variant, stages=(replace(stage, output=graded),))
     for number, truth in enumerate(TRUTHS):
-        result = board.score(a_frame(truth, number + 5), role, (variant,))
+        classes = np.where(truth == 1, 0, 1 + np.arange(4) % 2).astype(np.uint8)
+        frame = replace(a_frame(truth, number + 5), classes=classes)
+        result = board.score(frame, role, (variant,))
         if role is Role.EVALUATED:
             result = replace(result, disturbed={"fog:2": result})
         board.add(result)

@@ -30,6 +30,7 @@ from roadeval.data.result import Cells
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
+from roadeval.evaluation.score.classes import count_classes
 from roadeval.evaluation.score.counts import Name, changes, contours, count, error_map
 from roadeval.evaluation.score.metre_sums import measure
 from roadeval.evaluation.score.unlabelled import doubts_of
@@ -120,9 +121,11 @@ def _evaluate(
             by_stage = {(v.variant, stage): mask for stage, mask in oracle_masks.items()}
             replaced.setdefault(oracle, {}).update(by_stage)
     probabilities = _probabilities(variants).items()
+    finals = {v.variant: v.final() for v in variants}
+    by_class = {} if prior is None else {BASELINE: masks[BASELINE, FINAL_STAGE].pixels()}
     return replace(
         result,
-        errors={v.variant: error_map(v.final(), truth) for v in variants},
+        errors={variant: error_map(mask, truth) for variant, mask in finals.items()},
         tallies=tuple(tallies),
         health={variant: judge(final, blind) for variant, final in rates.items()},
         truth_bits=labels,
@@ -135,6 +138,11 @@ def _evaluate(
         },
         metres=metres,
         above={name: survey.levels(p, truth) for name, p in probabilities} if survey else {},
+        classes=(
+            {}
+            if frame.classes is None
+            else count_classes(frame.classes, truth, {**finals, **by_class})
+        ),
     )
 
 

@@ -39,6 +39,7 @@ from roadeval.data import (
 from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
+from roadeval.evaluation.score.classes import ClassSums
 from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
 from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
@@ -248,6 +249,7 @@ class Scoreboard:
         self.changes = defaultdict[Transition, Change](Change)
         """Every change between masks."""
         self.curves = Curves()
+        self.classes = ClassSums()
         self.unlabelled = Unlabelled(focus or next(iter(variants), ""))
         """The frames without truth."""
         self.apart: dict[int, Mapping[str, float]] = {}
@@ -295,6 +297,7 @@ class Scoreboard:
         for step, change in result.changes.items():
             self.changes[step] = Change(*map(add, self.changes[step], change))
         self.curves.add(result.histograms)
+        self.classes.add(result.frame.moment, result.classes)
         self._metres.add(result.metres)
         self._above.add(result.above)
         return doubts

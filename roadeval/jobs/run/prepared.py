@@ -455,7 +455,7 @@ def _process(
         return run, None  # the log's accounting has it, with the reason
     role = run.schedule.role(frame)
     if role is Role.UNLABELLED and frame.truth is not None:
-        frame = replace(frame, truth=None)  # it is a proposal as it was made
+        frame = replace(frame, truth=None, classes=None)  # it is a proposal as it was made
     truths_known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of_frame(frame)

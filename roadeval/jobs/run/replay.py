@@ -166,7 +166,7 @@ class _CameraResult:
 def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _CameraResult:
     """Sum up a camera's run, and add the sums to the tables."""
     sums = run.board.summary()
-    lines = csv_lines(run.key, sum_rows(run.board, sums.windows))
+    lines = csv_lines(run.key, sum_rows(run.board, sums.windows, run.selection.classes))
     results.append(lines)
     shown = [example.frame for example in examples]
     facts = summary.make_facts(run, sums, shown, {} if run.camera else results.tables)

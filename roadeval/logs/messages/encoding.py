@@ -1,8 +1,8 @@
 """Message encodings: from a message's bytes to its fields.
 
-Messages of images, calibrations and transforms are recognised by their schema's name. The layouts
-are those of ROS, ``ffmpeg_image_transport_msgs`` and Foxglove; they are used if a schema has no
-text, or a text that no library reads.
+Messages of images, calibrations, transforms and classes are recognised by their schema's name. The
+layouts are those of ROS, ``ffmpeg_image_transport_msgs`` and Foxglove; they are used if a schema
+has no text, or a text that no library reads.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ class TopicKind(StrEnum):
     VIDEO = "video"
     CALIBRATION = "calibration"
     TRANSFORMS = "transforms"
+    CLASSES = "classes"
     OTHER = "other"
 
 
 Fields = tuple[tuple[str, str], ...]
 """Names and types of a message's fields, in the order of their bytes."""
-_CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q", "f8": "d"}
+_CODES: Final = {"u1": "B", "u2": "H", "f4": "f", "u4": "I", "i4": "i", "u8": "Q", "f8": "d"}
 """Codes of `struct` for the types that are numbers."""
 
 
@@ -59,6 +60,7 @@ NESTED: Final = {
     "moved": _fields(_MOVED),
     "stamped": _fields(f"{_ROS} child_frame_id:str transform:moved"),
     "frame": _fields(_FRAME),
+    "class": _fields("class_id:u2 class_name:str"),
 }
 """The fields of types that are messages themselves."""
 
@@ -89,6 +91,7 @@ _KINDS_AND_FIELDS: Final = {
     "tf2_msgs/TFMessage": (TopicKind.TRANSFORMS, "transforms:stamped[]"),
     "foxglove/FrameTransform": (TopicKind.TRANSFORMS, _FRAME),
     "foxglove/FrameTransforms": (TopicKind.TRANSFORMS, "transforms:frame[]"),
+    "vision_msgs/LabelInfo": (TopicKind.CLASSES, f"{_ROS} class_map:class[] threshold:f4"),
 }
 """Kinds and fields of messages, by package and message."""
 LAYOUTS: Final = {name: _fields(fields) for name, (_, fields) in _KINDS_AND_FIELDS.items()}

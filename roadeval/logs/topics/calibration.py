@@ -59,8 +59,8 @@ def calibration_of(
         if topic.kind is TopicKind.CALIBRATION and topic.count
     }
     matching = {name: lens for name, lens in lenses.items() if lens[0] in ("", image.frame_id)}
-    near = max((_shared_parts(name, image.name) for name in matching), default=0)
-    best = [name for name in matching if _shared_parts(name, image.name) == near]
+    near = max((shared_parts(name, image.name) for name in matching), default=0)
+    best = [name for name in matching if shared_parts(name, image.name) == near]
     best = [name for name in best if matching[name][1]] or best
     if len(best) != 1 or not (near or matching[best[0]][0] or matching[best[0]][1] is None):
         why = f"none of {', '.join(lenses)} is clearly of {image.name}"
@@ -90,7 +90,7 @@ def calibration_of(
     return replace(lens, mounting=mounting), Sentence("; ").join(notes)
 
 
-def _shared_parts(one: str, other: str) -> int:
+def shared_parts(one: str, other: str) -> int:
     """Count the parts at the beginning that two paths share."""
     pairs = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
     return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)

@@ -117,7 +117,7 @@ def choose_truth(
     roads = [topic for topic in candidates if not topic.lossy]
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
     of_camera = [topic for topic in roads if topic.name not in elsewhere]
-    colors = bool(labels.road_colors)
+    colors = labels.by_color
     truth = _only(_clear_truths(of_camera, image, colors=colors), image, "label", "topics.truth")
     if truth is not None:
         by = "colours" if truth.channels == 3 else "single channel"

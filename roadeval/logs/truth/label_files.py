@@ -142,8 +142,9 @@ def _read_drawn(
             f"{without} of {len(drawings)} images have no shape, and count as not labelled"
         )
     occurring = Counter(sorted(name for drawing in labelled for name in drawing.classes))
-    road = settings.labels.road or (tuple(occurring) if len(occurring) == 1 else ())
-    ignored = {*map(str, settings.labels.ignore)}
+    labels = settings.labels.with_values(format_.name, classes=occurring)
+    road = labels.road or (tuple(occurring) if len(occurring) == 1 else ())
+    ignored = {*map(str, labels.ignore)}
     roles = ClassRoles({*map(str, road)}, ignored, settings.skip_roadless)
     labelled = settle_shapes(labelled, roles, broken, notes)
     if not labelled:
@@ -151,12 +152,12 @@ def _read_drawn(
         where = image if str(files[0]) == str(image) else f"{files[0]}: {image}"
         raise LogError(problem, where=where)
     classes = {name: value for value, name in enumerate(occurring, 1)}
-    labels = [_named_label(drawing, classes, format_) for drawing in labelled]
-    labels += [
+    drawn = [_named_label(drawing, classes, format_) for drawing in labelled]
+    drawn += [
         NamedLabel(Path(name), bytes, partial(_raise_problem, problem))
         for name, problem in broken.items()
     ]
-    return LabelSet(labels, classes, occurring, lost, tuple(notes))
+    return LabelSet(drawn, classes, occurring, lost, tuple(notes))
 
 
 def _read_images(

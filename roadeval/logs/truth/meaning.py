@@ -10,19 +10,32 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Rgb, Truth
+from roadeval.data import (
+    IGNORE,
+    NO_CLASS,
+    NON_ROAD,
+    ROAD,
+    Classes,
+    Mask,
+    Probability,
+    Rgb,
+    Truth,
+    TruthClass,
+)
 from roadeval.data.words import counted
 from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import is_shown
+from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import (
     format_of,
@@ -32,9 +45,10 @@ from roadeval.logs.messages.pixels import (
     to_labels,
     to_rgb,
 )
-from roadeval.logs.settings import Color, LabelPlace, LabelSettings, MaskSettings
+from roadeval.logs.settings import LabelPlace, LabelSettings, MaskSettings
+from roadeval.logs.topics.calibration import shared_parts
 from roadeval.logs.topics.choose import lossy_labels
-from roadeval.logs.topics.reader import TopicReader
+from roadeval.logs.topics.reader import TopicInfo, TopicReader
 from roadeval.logs.truth.named_labels import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
@@ -75,6 +89,8 @@ class Labels:
 
     truth: Truth
     """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
+    classes: Classes | None = None
+    """The classes of the pixels, as in `roadeval.data.Frame`."""
     probability: Probability | None = None
     """``(H, W)`` uint16 codes of a confidence map."""
 
@@ -92,6 +108,58 @@ class ClassMap:
     words: str
     notes: tuple[str, ...] = ()
     """Doubts about the meaning, a sentence each."""
+    names: Mapping[int, str] = field(default_factory=dict)
+    """The names of label values, or packed colours, as far as they are known."""
+    codes: dict[int, int] = field(default_factory=dict)
+    """The code of each label value, or packed colour, that has occurred, in the order of codes."""
+
+    @property
+    def classes(self) -> list[TruthClass]:
+        """The classes that have occurred, each at the position of its code."""
+        words = {ROAD: "road", NON_ROAD: "other", IGNORE: "ignored"}
+        colour = _color_name if self.by_color else lambda _: ""
+        return [
+            TruthClass(value, self.names.get(value) or colour(value), words[self.truth_of(value)])
+            for value in self.codes
+        ]
+
+    def truth_of(self, value: int) -> int:
+        """Return the truth of a label value or a packed colour."""
+        return self.meaning.get(value, IGNORE if value < 0 else self.others)
+
+    @cached_property
+    def _code_table(self) -> npt.NDArray[np.uint8]:
+        """One more than the code by label value or packed colour; 0 for none."""
+        table = np.zeros(1 << 24 if self.by_color else TOP + 1 - LEAST, np.uint8)
+        for value, code in self.codes.items():
+            table[value] = code + 1
+        return table
+
+    def classes_of(self, labels: npt.NDArray[Any]) -> Classes | None:
+        """Return the codes of ``(H, W)`` labels or packed colours; None for those of plain masks.
+
+        Of more than 255 classes the last ones have no code. Any thread may call this.
+        """
+        import cv2
+
+        if self.others == UNKNOWN:
+            return None
+        values = np.maximum(labels, LEAST) if labels.dtype.kind == "i" else labels
+        table = self._code_table
+
+        def look_up() -> Classes:
+            if values.dtype != np.uint8:
+                return np.asarray(table[values] - np.uint8(1))
+            return cv2.LUT(np.ascontiguousarray(values), table[:256] - np.uint8(1))
+
+        codes = look_up()
+        if (unseen := values[codes == NO_CLASS]).size:
+            with _CODING:
+                for value in np.unique(unseen).tolist():
+                    if value in self.codes or len(self.codes) < NO_CLASS:
+                        table[value] = self.codes.setdefault(value, len(self.codes)) + 1
+            codes = look_up()
+        return codes
 
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
@@ -115,11 +183,11 @@ class ClassMap:
             truth = np.full(colors.shape, self.others, np.uint8)
             for color, meaning in self.meaning.items():
                 truth[colors == color] = meaning
-            return Labels(truth)
+            return Labels(truth, classes=self.classes_of(colors))
         values = to_labels(picture, limits)
         if values.ndim != 2:
             raise BadMessage("it holds colours, not label values")
-        return Labels(self.of_values(values))
+        return Labels(self.of_values(values), classes=self.classes_of(values))
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
         """Translate ``(H, W)`` labels; a `BadMessage` if a value is unknown, or beyond 65535."""
@@ -180,6 +248,8 @@ class Confidence:
         return levels.astype(np.uint16) * (TOP // 255) if levels.dtype == np.uint8 else levels
 
 
+_CODING: Final = Lock()
+"""Held while values get codes."""
 Meaning = ClassMap | Confidence
 """The meaning of the label pictures of one source."""
 
@@ -235,14 +305,23 @@ def find_meaning(
     """
     values = sorted({value for picture in pictures for value in picture})
     has_negatives, remedy = values[:1] < [0], NAME_THEM
+    keys = {tuple(map(int, key.split(","))): text for key, text in labels.names.items()}
+    names = {_pack_color(key) if len(key) == 3 else key[0]: text for key, text in keys.items()}
+
+    def text_of(value: Any) -> str:
+        text = _color_name(value) if labels.road_colors else str(value)
+        return f"{text} ({names[value]})" if value in names else text
+
+    there = f"{name}, whose frames hold {_listed(map(text_of, values))}"
     if labels.road or labels.road_colors:
-        codes = {value: value for value in values}
-        there = f"{name}, whose frames hold "
+        # A class that has a name may be rare.
+        codes = {value: value for value in (*values, *names)}
         if labels.road_colors:
-            names = (map(_pack_color, labels.road_colors), map(_pack_color, labels.ignore_colors))
-            there += _listed(map(_color_name, values))
-            return _as_named(*names, codes, there, text=_color_name, ending="_colors")
-        meaning = _as_named(labels.road, labels.ignore, codes, there + _listed(map(str, values)))
+            colors = (map(_pack_color, labels.road_colors), map(_pack_color, labels.ignore_colors))
+            meaning = _as_named(*colors, codes, there, text=text_of, ending="_colors")
+            return replace(meaning, names=names)
+        meaning = _as_named(labels.road, labels.ignore, codes, there, text=text_of)
+        meaning = replace(meaning, names=names)
         unnamed = any(value < 0 and value not in meaning.meaning for value in values)
         return replace(meaning, words=f"{meaning.words}; {NO_LABEL}") if unnamed else meaning
     for truths in _MASKS:
@@ -255,7 +334,7 @@ def find_meaning(
             words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored, shown)}"
             words += f"; {NO_LABEL}" if has_negatives else ""
             return ClassMap(truths, UNKNOWN, False, words)
-    problem = f"{name} holds the values {_listed(map(str, values))}"
+    problem = f"{name} holds the values {_listed(map(text_of, values))}"
     raise UnclearLabelsError(problem, remedy=remedy)
 
 
@@ -277,7 +356,8 @@ def find_class_meaning(labels: LabelSettings, origin: LabelSet, name: str) -> Cl
     meaning = _as_named(*names, classes, f"{name}, which has the classes {there}")
     rest = [label for label in classes if classes[label] not in meaning.meaning]
     words = f"; non-road is all else, {_counted(origin, rest)}" if rest else ""
-    return replace(meaning, words=meaning.words + words)
+    texts = {value: labels.names.get(label, label) for label, value in classes.items()}
+    return replace(meaning, words=meaning.words + words, names={0: "no shape", **texts})
 
 
 def _as_named(
@@ -300,8 +380,10 @@ def _as_named(
         words.append([])
         for name in names:
             if name not in codes:
-                problem = f"{text(name)} does not occur in {there}"
-                raise LogError(problem, setting=f"labels.{setting}{ending}")
+                problem, place = f"{text(name)} does not occur in {there}", f"labels.{setting}"
+                has_no_names = isinstance(name, str) and int in map(type, codes)
+                remedy = "name its values in {labels.names}" if has_no_names else ""
+                raise LogError(problem, setting=f"{place}{ending}", remedy=Sentence(remedy))
             meaning[codes[name]] = truth
             words[-1].append(text(name))
     return ClassMap(meaning, NON_ROAD, bool(ending), _words(words[0], words[1]))
@@ -320,7 +402,7 @@ def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
     return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
 
 
-def _pack_color(color: Color) -> int:
+def _pack_color(color: Sequence[int]) -> int:
     return color[0] << 16 | color[1] << 8 | color[2]
 
 
@@ -341,6 +423,28 @@ def _listed(names: Iterable[str], limit: int = 16) -> str:
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A path of a log and a topic; a single letter before the colon is a disk's."""
+
+
+def class_names(
+    label: str, topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]
+) -> dict[str, str]:
+    """Return the names of a label topic's values, from the ``vision_msgs/LabelInfo`` beside it.
+
+    That is the one whose path shares most with the labels'. Empty without one, or if several do.
+    """
+    near = {
+        topic.name: shared_parts(topic.name, label)
+        for topic in topics
+        if topic.kind is TopicKind.CLASSES and topic.count
+    }
+    best = [name for name, parts in near.items() if parts == max(near.values())]
+    if len(best) == 1 and (near[best[0]] or best[0].count("/") <= 1):
+        reader = readers[best[0]]
+        for position in range(min(len(reader), LOOKED_AT)):
+            with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+                classes = reader.fields(position).class_map
+                return {str(int(item.class_id)): str(item.class_name) for item in classes}
+    return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,10 +507,12 @@ def source_beside_log(
     log: str = "",
     *,
     offset_ms: float = 0.0,
+    names: Mapping[str, str] | None = None,
 ) -> LabelSource:
     """Settle labels with names, or of a topic of another ``log``; the offset delays their stamps.
 
-    A `LogError` if none belongs to a frame, or they have another size or no clear meaning.
+    ``names`` are those of `meaning_of`. A `LogError` if none belongs to a frame, or they have
+    another size or no clear meaning.
     """
     notes: tuple[str, ...] = ()
     if isinstance(labels, NamedLabels):
@@ -427,7 +533,7 @@ def source_beside_log(
         raise LogError(problem, setting="topics.sync_offset_ms")
     else:
         pairing = by_number(labels, settings, camera.images)
-    meaning = meaning_of(labels, settings, camera, pairing)
+    meaning = meaning_of(labels, settings, camera, pairing, names=names)
     notes += (pairing.note,) if pairing.note else ()
     why = f"{len(labels)} {what}, paired by {words}"
     return LabelSource(where, labels, meaning, pairing, why, digest, notes)
@@ -504,12 +610,15 @@ def meaning_of(
     pairing: Pairing | None = None,
     *,
     shown: str = "road",
+    names: Mapping[str, str] | None = None,
 ) -> Meaning:
     """Find the meaning of labels by looking at some; check the size of labels beside the log, too.
 
-    The masks show road, or what ``shown`` names. A `LogError` if their values have no clear
-    meaning.
+    The masks show road, or what ``shown`` names; ``names`` are those of values, as the log tells
+    them. A `LogError` if their values have no clear meaning.
     """
+    origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
+    stated = settings.labels.with_values(labels.name, names, origin.classes)
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []
     problem = ""
@@ -519,7 +628,7 @@ def meaning_of(
             if camera and pairing:
                 check_size(size_of(picture, labels.limits), labels, position, camera, pairing)
             if confidence is None:
-                values = count_values(picture, settings.labels, labels.name, labels.limits, file)
+                values = count_values(picture, stated, labels.name, labels.limits, file)
             else:
                 values = {int(confidence.codes(picture, labels.limits).max()): 1}
             counts.append(values)
@@ -529,23 +638,21 @@ def meaning_of(
         raise undecodable(labels, problem)
     if confidence is not None:
         return confidence
-    origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
     if origin.occurring:
-        meaning = find_class_meaning(settings.labels, origin, labels.name)
+        meaning = find_class_meaning(stated, origin, labels.name)
     else:
-        meaning = find_meaning(settings.labels, counts, labels.name, shown)
+        meaning = find_meaning(stated, counts, labels.name, shown)
     pixels = sum(map(Counter, counts), Counter[int]())
+    meaning = replace(meaning, codes={v: n for n, v in enumerate(sorted(pixels)[:NO_CLASS])})
     of_truth = Counter[int]()
     for value, count in pixels.items():
         of_truth[meaning.meaning.get(value, meaning.others)] += count
     road, labelled = of_truth[ROAD], pixels.total() - of_truth[IGNORE]
-    is_named = settings.labels.road or settings.labels.road_colors
+    is_named = stated.road or stated.road_colors
     if not is_named or road >= RARE * labelled:
         return meaning
-    names = {value: name for name, value in origin.classes.items()}
-    names |= {0: "no shape"} if names else {}
     shares = ", ".join(
-        f"{names.get(value) or (_color_name(value) if meaning.by_color else value)} "
+        f"{meaning.names.get(value) or (_color_name(value) if meaning.by_color else value)} "
         f"({100 * count / pixels.total():.1f} %)"
         for value, count in pixels.most_common(8)
     )

@@ -1,0 +1,95 @@
+"""The classes of the truth: which are called road, and beside which road is missed."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.data import NO_CLASS, NON_ROAD, ROAD, Classes, Mask, Moment, Truth, TruthClass
+from roadeval.data.arrays import Sums
+
+BESIDE: Final = 75
+"""Missed road lies beside a class within a 75th of the image's diagonal: 8 pixels of 480x360."""
+SHOWN: Final = 3
+"""Worst frames of a class."""
+APART_NS: Final = 1_000_000_000
+"""The least time between them."""
+
+
+def count_classes(classes: Classes, truth: Truth, masks: Mapping[str, Mask]) -> dict[str, Sums]:
+    """Count each class in each mask: ``(256, 3)`` by the mask's name, a row for each code.
+
+    Columns are the pixels of the class; those that are called road; and the missed road beside it:
+    the road pixels outside the mask whose nearest non-road pixel is of the class, and lies within
+    `BESIDE`.
+    """
+    import cv2
+
+    is_other = truth == NON_ROAD
+    distances, numbers = cv2.distanceTransformWithLabels(
+        (~is_other).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    class_of = np.full(numbers.max() + 1, NO_CLASS, np.uint8)
+    class_of[numbers[is_other]] = classes[is_other]
+    band = np.flatnonzero((truth == ROAD) & (distances <= math.hypot(*truth.shape) / BESIDE))
+    beside = class_of[numbers.ravel()[band]]
+    pixels = np.bincount(classes.ravel(), minlength=256)
+    return {
+        name: np.stack(
+            [
+                pixels,
+                np.bincount(classes[mask.view(np.bool_)], minlength=256),
+                np.bincount(beside[mask.ravel()[band] == 0], minlength=256),
+            ],
+            axis=1,
+        )
+        for name, mask in masks.items()
+    }
+
+
+class ClassSums:
+    """Sums of `count_classes` over a drive, and the frames in which each class costs most."""
+
+    def __init__(self) -> None:
+        self._sums = defaultdict[str, Sums](lambda: np.zeros((256, 4), np.int64))
+        """Columns as of `count_classes`, and the frames that have the class."""
+        self._worst = defaultdict[tuple[str, int, bool], list[tuple[int, Moment]]](list)
+        """Missed or false road and its frame, the worst first, by variant, code, and if missed."""
+
+    def add(self, moment: Moment, by_variant: Mapping[str, Sums]) -> None:
+        """Add the counts of a frame."""
+        for variant, counts in by_variant.items():
+            self._sums[variant] += np.column_stack([counts, counts[:, 0] > 0])
+            missed = counts[:, 0] - counts[:, 1]
+            for is_missed, costs in enumerate((counts[:, 1], missed)):
+                for code in np.flatnonzero(costs[:NO_CLASS]).tolist():
+                    worst = self._worst[variant, code, bool(is_missed)]
+                    worst.append((int(costs[code]), moment))
+                    worst.sort(key=lambda frame: -frame[0])
+                    for place, (_, frame) in reversed([*enumerate(worst)]):
+                        before = (other.stamp_ns for _, other in worst[:place])
+                        is_near = any(abs(frame.stamp_ns - ns) < APART_NS for ns in before)
+                        if is_near or place >= SHOWN:
+                            del worst[place]
+
+    def rows(self, classes: Sequence[TruthClass]) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``classes``; none if classes tell no more than the truth itself.
+
+        ``classes`` are in the order of codes. More than fit into codes are no classes, but objects.
+        """
+        frames = next(iter(self._sums.values()))[:, 3].tolist() if self._sums else []
+        seen = [label for label, count in zip(classes, frames, strict=False) if count]
+        kinds = Counter(label.truth for label in seen if label.truth != "ignored")
+        if max(kinds.values(), default=0) < 2 or len(classes) >= NO_CLASS:
+            return
+        for variant, sums in self._sums.items():
+            for code, label in sorted(enumerate(classes), key=lambda item: item[1].value):
+                worst = self._worst[variant, code, label.truth == "road"]
+                shown = worst if label.truth != "ignored" else []
+                numbers = " ".join(str(moment.number) for _, moment in shown)
+                if sums[code, 3]:
+                    yield variant, *label, *sums[code].tolist(), numbers
