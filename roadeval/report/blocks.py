@@ -118,6 +118,9 @@ class BulletList(Block):
     items: Sequence[str]
     tone: str = "plain"
     """``plain`` or ``warning``."""
+    focus: str = ""
+    """The variant that it is about; a page shows it while this is the focus. Empty: always."""
+    on_paper: bool = True
 
 
 @dataclass(frozen=True)

@@ -283,6 +283,8 @@ class Facts(FactsFile):
     """Totals with a stage replaced by the truth."""
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, by variant and disturbance."""
+    why: dict[str, list[str]] = field(default_factory=dict)
+    """What is confirmed about the errors of each variant, see `roadeval.results.why.explain`."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
     windows: int = 0
@@ -325,11 +327,11 @@ class Facts(FactsFile):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled", "estimate", "misfits", "disturbances"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "why"),
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "methods", "masks", "files"),
-        *("cameras", "unlabelled", "estimate", "misfits", "disturbances"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "why"),
     )
 
     def content(self) -> dict[str, Any]:
@@ -436,14 +438,17 @@ class FleetFacts(FactsFile):
     """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, over drives."""
+    why: dict[str, list[str]] = field(default_factory=dict)
+    """As of a drive."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
     RESULTS = (
         *("verdict", "counts", "frames", "totals", "effects", "strata", "warnings", "misfits"),
         "disturbances",
+        "why",
     )
-    OPTIONAL = ("misfits", "disturbances")
+    OPTIONAL = ("misfits", "disturbances", "why")
 
 
 def is_fleet(path: str | Path) -> bool:

@@ -178,10 +178,11 @@ LEAST_WRONG: Final = 0.001
 """Less false road, or missed road, than this share of the pixels makes no sentence."""
 
 
-def describe_classes(classes: pd.DataFrame, variant: str) -> Iterator[str]:
-    """Yield which classes the false road of a variant is, and which lie beside its missed road.
+def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
+    """Return which classes the false road of a variant is, and which lie beside its missed road.
 
-    ``classes`` are the rows of the table of that name, of any number of drives.
+    The sentences have the names ``false`` and ``missed``; rare errors have none. ``classes`` are
+    the rows of the table of that name, of any number of drives.
     """
     rows = only(classes, variant=variant)
     is_other = rows["truth"] == "other"
@@ -193,6 +194,7 @@ def describe_classes(classes: pd.DataFrame, variant: str) -> Iterator[str]:
     }
     drives = rows["drive"].nunique()
     over = f" (mean of {drives} drives)" if drives > 1 else ""
+    sentences = {}
     for kind, verb, word in (("false", "is", ""), ("missed", "lies beside", "beside ")):
         if wrong[kind] < max(1, LEAST_WRONG * counted_rows["pixels"].sum()):
             continue
@@ -200,7 +202,8 @@ def describe_classes(classes: pd.DataFrame, variant: str) -> Iterator[str]:
         (first, most), *others = shares.head(NAMED).items()
         more = [f"{percent(share, 0)} % {word}{name}" for name, share in others if share >= 0.1]
         parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}", *more]
-        yield f"{', '.join(parts)}{over}."
+        sentences[kind] = f"{', '.join(parts)}{over}."
+    return sentences
 
 
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:

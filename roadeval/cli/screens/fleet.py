@@ -16,7 +16,7 @@ from roadeval.data.words import first_of
 from roadeval.report.blocks import Block, Heading
 from roadeval.report.sections import disturbances
 from roadeval.report.sections.drives import by_reason, drives_table
-from roadeval.report.sections.summary import drives_account
+from roadeval.report.sections.summary import drives_account, why
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
 
@@ -46,6 +46,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         blocks: list[Block] = [rates_table(facts)]
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
         blocks += disturbances.brief(facts)
+        blocks += [reasons for reasons in why(facts) if reasons.on_paper]
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show(
             [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],

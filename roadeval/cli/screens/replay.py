@@ -19,6 +19,7 @@ from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections import disturbances
 from roadeval.report.sections.ground import distance_table
+from roadeval.report.sections.summary import why
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction
@@ -74,6 +75,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
     yield from disturbances.brief(facts)
     if metres:
         yield distance_table(metres, [*facts.finals], brief=True)
+    yield from (reasons for reasons in why(facts) if reasons.on_paper)
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

@@ -27,6 +27,8 @@ from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
+from roadeval.results.tables import read_table
+from roadeval.results.why import explain
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
 from roadeval.runtime.sentence import Sentence
@@ -170,6 +172,8 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
     results.append(lines)
     shown = [example.frame for example in examples]
     facts = summary.make_facts(run, sums, shown, {} if run.camera else results.tables)
+    classes = read_table("classes", TABLES["classes"].header + lines.get("classes", ""))
+    facts = replace(facts, why=explain(facts, classes))
     return _CameraResult(facts, sums, _recorded_texts(run, facts, lines), tuple(run.board.metres()))
 
 

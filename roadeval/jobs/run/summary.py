@@ -251,6 +251,7 @@ def join_cameras(
         thresholds={},
         oracles={},
         disturbances=degradations(disturbed, frames, first.evaluation),
+        why={},
         seconds={},
         examples=[],
         training=TrainingFacts(first.training.source, model=first.training.model),

@@ -28,7 +28,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     if not len(of_focus):
         return
     yield Heading("Which class is the false road")
-    if sentence := " ".join(describe_classes(rows, str(focus))):
+    if sentence := " ".join(describe_classes(rows, str(focus)).values()):
         yield Text(sentence)
     is_other = of_focus["truth"] == "other"
     is_wrong = is_other & (of_focus[["false", "missed"]].max(axis=1) >= LEAST)

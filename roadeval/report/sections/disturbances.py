@@ -46,14 +46,13 @@ def errors_by_variant(facts: Facts | FleetFacts) -> dict[str, dict[str, float | 
 
 
 def brief(facts: Facts | FleetFacts) -> Iterator[Block]:
-    """Yield what a terminal shows: ERR by disturbance and variant, and the sentence."""
+    """Yield what a terminal shows: ERR by disturbance and variant."""
     if columns := errors_by_variant(facts):
         cells = zip(*(map(percent, errors.values()) for errors in columns.values()), strict=True)
         names = next(iter(columns.values()))
         rows = [[text, *row] for text, row in zip(names, cells, strict=True)]
         legend = caption("disturbances")
         yield Table(["disturbed by", *columns], rows, text_columns=(0,), caption=legend, small=True)
-        yield Text(describe_disturbances(facts.disturbances, facts.focus))
 
 
 def _table(facts: Facts | FleetFacts) -> Table:
@@ -75,7 +74,7 @@ def _table(facts: Facts | FleetFacts) -> Table:
                 ]
             )
     return Table(
-        ["variant", "disturbed by", "from, %", "to, %", "pp", "interval", "better", "worse"],
+        ["variant", "disturbed by", "from, %", "to, %", "points", "interval", "better", "worse"],
         rows,
         text_columns=(0, 1),
         breaks=breaks[1:],

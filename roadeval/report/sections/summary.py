@@ -21,6 +21,7 @@ from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
 from roadeval.report.sections.drives import WORST_AT
 from roadeval.report.tables import differences_table, rates_table
+from roadeval.results.facts import Facts, FleetFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import records
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
@@ -49,6 +50,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [caption("partial")], "warning")
     yield Text(findings.facts.verdict, "verdict")
+    yield from why(findings.facts)
     for frame in findings.worst[:1]:
         title = f"First frame to look at: {frame.frame}"
         if frame.rates:
@@ -72,6 +74,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
 def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     facts = findings.facts
     yield Text(facts.verdict, "verdict")
+    yield from (reasons for reasons in why(facts) if reasons.on_paper)
     for frame in records(findings.worst[:1]):
         where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
         title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"
@@ -83,6 +86,14 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
         yield note("weights of drives")
     yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
     yield _beware([*fleet_warnings(findings)])
+
+
+def why(facts: Facts | FleetFacts) -> Iterator[BulletList]:
+    """Yield why each variant errs, as far as it is confirmed; the focus first, alone on paper."""
+    focus = facts.focus
+    for name in sorted(facts.why, key=lambda name: name != focus):
+        is_focus = name == focus
+        yield BulletList(f"Why {name} errs", facts.why[name], focus=name, on_paper=is_focus)
 
 
 def _beware(sentences: list[str]) -> BulletList:

@@ -169,6 +169,7 @@ class Browser {
   /** Show a change of the focus, or of the variant beside it, all over the page. */
   chosen(isNew = true) {
     const others = this.data.variants.filter((name) => name !== choice.focus && name !== "blind");
+    for (const part of document.querySelectorAll("[data-focus]")) part.hidden = part.dataset.focus !== choice.focus;
     this.stage?.prefer([choice.focus, choice.beside || others[0]]);
     for (const view of along) view.show(view.low, view.high);
     this.filter();
