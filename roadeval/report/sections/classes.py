@@ -7,7 +7,7 @@ from typing import Final
 
 from roadeval.data.words import percent
 from roadeval.evaluation.tables import by_class, only
-from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, Table, Text
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart, ChartKind, looks
 from roadeval.report.charts.standard import series
@@ -29,7 +29,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
         return
     yield Heading("Which class is the false road")
     if sentence := " ".join(describe_classes(rows, str(focus)).values()):
-        yield Text(sentence)
+        yield Text(f"{focus}: {sentence}")
     is_other = of_focus["truth"] == "other"
     is_wrong = is_other & (of_focus[["false", "missed"]].max(axis=1) >= LEAST)
     shown = of_focus[is_wrong].head(MOST)
@@ -64,10 +64,11 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     }
     if isinstance(findings, FleetFolder):
         del columns["worst frames"]
-    yield Table(
+    table = Table(
         [*columns],
         [*zip(*columns.values(), strict=True)],
         text_columns=[0, 1],
         caption=caption("table of classes", variant=focus),
         small=True,
     )
+    yield Details("Every class in numbers", [table])
