@@ -84,8 +84,12 @@ def test_noise_has_the_variance_of_electrons_and_of_reading_them():
     assert noisy.var() * well**2 == pytest.approx(electrons + 3**2, rel=0.02)
 
 
-def test_noise_is_the_shot_noise_of_albumentations():
+def test_noise_and_jpeg_are_those_of_albumentations():
     albumentations = pytest.importorskip("albumentations")
+    compress = albumentations.ImageCompression(quality_range=(20, 20), p=1)
+    theirs = compress(image=IMAGE)["image"]  # it takes red for blue
+    ours = Disturbance("jpeg", 20.0).of(np.ascontiguousarray(IMAGE[..., ::-1]), 1)
+    assert np.array_equal(ours[..., ::-1], theirs)
     grey = np.full((300, 300, 3), 150, np.uint8)
     scale = 4 / 4096  # its light of one photon
     shot = albumentations.ShotNoise(scale_range=(scale, scale), p=1)(image=grey)["image"]
