@@ -26,9 +26,6 @@ MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
 """Least difference between errors and stated errors that `describe_overconfidence` reports."""
-_OF_FILTER: Final = "The filter "
-"""Beginning of the note on the filter's effect on a frame."""
-
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
@@ -47,16 +44,18 @@ _WHY: Final = {
 """Words behind a number of frames, by the reasons of `roadeval.results.facts.FrameAccount`."""
 
 
-def account(frames: FrameAccount, windows: int | None = None) -> str:
+def account(frames: FrameAccount, windows: int = 0, size: int = 10) -> str:
     """Return how many frames of a log were evaluated, and why the others were not.
 
+    ``windows`` are the groups of ``size`` frames that they make.
+
     >>> account(FrameAccount(in_log=100, evaluated=90, skipped={"trained on": 10}), 9)
-    '90 of 100 frames were evaluated, in 9 windows. Left out: 10 to train on.'
+    '90 of 100 frames were evaluated, in 9 groups of 10. Left out: 10 to train on.'
     """
     total = frames.evaluated if frames.in_log is None else frames.in_log
     of = "" if frames.evaluated == total else f"{number(frames.evaluated)} of "
     verb = "was" if frames.evaluated == 1 else "were"
-    within = f", in {counted(windows, 'window')}" if windows else ""
+    within = f", in {counted(windows, 'group')} of {size}" if windows else ""
     sentence_on_frames = f"{of}{counted(total, 'frame')} {verb} evaluated{within}."
     why = [f"{number(count)} {_WHY.get(name, name)}" for name, count in frames.skipped.items()]
     return f"{sentence_on_frames} Left out: {', '.join(why)}." if why else sentence_on_frames
@@ -155,53 +154,48 @@ def describe_classes(classes: pd.DataFrame, variant: str) -> Iterator[str]:
     ``classes`` are the rows of the table of that name, of any number of drives.
     """
     rows = only(classes, variant=variant)
-    is_other = rows["truth"] == "other"
-    counted_rows = rows[rows["truth"] != "ignored"]
-    missed = counted_rows["pixels"] - counted_rows["road"]
-    wrong = {
-        "false": rows["road"][is_other].sum(),
-        "missed": missed[counted_rows["truth"] == "road"].sum(),
-    }
-    drives = rows["drive"].nunique()
+    pixels, is_road = rows["pixels"], rows["truth"] == "road"
+    is_other, drives = rows["truth"] == "other", rows["drive"].nunique()
+    least = max(1, LEAST_WRONG * pixels[is_road | is_other].sum())
     over = f" (mean of {drives} drives)" if drives > 1 else ""
-    for kind, verb, word in (("false", "is", ""), ("missed", "lies beside", "beside ")):
-        if wrong[kind] < max(1, LEAST_WRONG * counted_rows["pixels"].sum()):
-            continue
-        shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
-        (first, most), *others = shares.head(NAMED).items()
-        more = [f"{percent(share, 0)} % {word}{name}" for name, share in others if share >= 0.1]
-        parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}", *more]
-        yield f"{', '.join(parts)}{over}."
-
-
-def without_filter(notes: Iterable[str]) -> list[str]:
-    """Return a frame's notes without the one on the filter, whose effect is shown apart."""
-    return [note for note in notes if not note.startswith(_OF_FILTER)]
+    for kind, wrong, verb, beside in (
+        ("false", rows["road"][is_other], "is", ""),
+        ("missed", (pixels - rows["road"])[is_road], "lies beside", "beside "),
+    ):
+        if wrong.sum() >= least:
+            shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
+            (first, most), *others = shares.head(NAMED).items()
+            parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}"]
+            parts += [f"{percent(part, 0)} % {beside}{n}" for n, part in others if part >= 0.1]
+            yield f"{', '.join(parts)}{over}."
 
 
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
     """Return the notes on a frame from its tallies; none on a frame that is not evaluated."""
     finals = {tally.variant: tally.rates for tally in tallies}
-    blind = finals.pop(BASELINE, None)
-    return tuple(notes(finals, blind))
+    return tuple(notes(finals))
 
 
-def notes(
-    finals: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
-) -> Iterator[str]:
-    """Yield what a person should know of a frame, by the final masks' rates and the baseline's."""
-    if FILTERED in finals and UNFILTERED in finals:
+def notes(finals: Mapping[str, Mapping[str, float]], focus: str | None = None) -> Iterator[str]:
+    """Yield what a person should know of a frame, by the rates of final masks.
+
+    With a ``focus`` they are about this variant alone, beside its rates.
+    """
+    blind = finals.get(BASELINE)
+    variants = [name for name in finals if name != BASELINE and focus in (None, name)]
+    if FILTERED in variants and UNFILTERED in finals:
         change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
         if abs(change) >= NOTEWORTHY:
             verb = "raised" if change > 0 else "lowered"
-            yield f"{_OF_FILTER}{verb} ERR by {percent(abs(change), 1)} points on this frame."
-    for name, rates in finals.items():
+            yield f"The filter {verb} ERR by {percent(abs(change), 1)} points on this frame."
+    for name in variants if focus is None else ():
+        rates = finals[name]
         if rates["FNR"] >= FAILED_FNR:
             yield f"{name} finds {percent(1 - rates['FNR'], 1)} % of the road."
         elif rates["ERR"] >= FAILED_ERR:
             yield f"{name} gets {percent(rates['ERR'], 1)} % of the pixels wrong."
-    for name, rates in finals.items():
-        if blind is not None and (excess := rates["ERR"] - blind["ERR"]) >= NOTEWORTHY:
+    for name in variants:
+        if blind and (excess := finals[name]["ERR"] - blind["ERR"]) >= NOTEWORTHY:
             yield (
                 f"{name} is {percent(excess, 1)} points worse than {BASELINE} "
                 f"(ERR {percent(blind['ERR'], 1)} %)."
