@@ -377,7 +377,7 @@ def _class_changes(label: str, base: pd.DataFrame, new: pd.DataFrame) -> Iterato
         sides = (by_class(only(rows, variant=variant)) for rows in (base, new))
         before, after = (shares["false"][shares["truth"] == "other"] for shares in sides)
         shares = after.to_frame("new").join(before.rename("base"), how="outer").fillna(0)
-        if not len(before) or shares["new"].equals(shares["base"]):
+        if before.isna().all() or after.isna().all() or shares["new"].equals(shares["base"]):
             continue
         for name, row in shares.sort_values("new", ascending=False, kind="stable").iterrows():
             if row.max() >= 0.01:
