@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison.compare import (
+    ClassChange,
     ComparedResult,
     Comparison,
     DriveChange,
@@ -36,7 +37,7 @@ from roadeval.results import comparison as sentences
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
-Row = MaskChange | MovedFrame | RegionChange | DriveChange
+Row = MaskChange | MovedFrame | RegionChange | DriveChange | ClassChange
 """A fact on a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
 """The function that makes a row's cell in each column, by the columns' titles."""
@@ -45,7 +46,7 @@ NAMED: Final = 20
 CHANGE: Final = ("base %", "new %", "change", "interval")
 """The titles of a change's columns."""
 _COMMAND: Final = "in the viewer"
-_WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp")
+_WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp", "class")
 """The columns of words, beside the commands."""
 
 
@@ -224,6 +225,15 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         unchanged = "" if len(rows) == len(comparison.regions) else "regions without a change"
         notes = [caption(name) for name in (unchanged, "regions left out") if name]
         yield Text(" ".join(filter(None, [legend, *notes])), "note")
+    if comparison.classes:
+        yield Heading("Which class is the false road", 2)
+        columns = {
+            "class": lambda row: row.name,
+            "base %": lambda row: percent(row.base),
+            "new %": lambda row: percent(row.new),
+            "change pp": lambda row: points(row.new - row.base),
+        }
+        yield _table(comparison.classes, columns, caption("classes of a comparison"))
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         columns = {

@@ -185,24 +185,21 @@ def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
     the rows of the table of that name, of any number of drives.
     """
     rows = only(classes, variant=variant)
-    is_other = rows["truth"] == "other"
-    counted_rows = rows[rows["truth"] != "ignored"]
-    missed = counted_rows["pixels"] - counted_rows["road"]
-    wrong = {
-        "false": rows["road"][is_other].sum(),
-        "missed": missed[counted_rows["truth"] == "road"].sum(),
-    }
-    drives = rows["drive"].nunique()
+    pixels, is_road = rows["pixels"], rows["truth"] == "road"
+    is_other, drives = rows["truth"] == "other", rows["drive"].nunique()
+    least = max(1, LEAST_WRONG * pixels[is_road | is_other].sum())
     over = f" (mean of {drives} drives)" if drives > 1 else ""
     sentences = {}
-    for kind, verb, word in (("false", "is", ""), ("missed", "lies beside", "beside ")):
-        if wrong[kind] < max(1, LEAST_WRONG * counted_rows["pixels"].sum()):
-            continue
-        shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
-        (first, most), *others = shares.head(NAMED).items()
-        more = [f"{percent(share, 0)} % {word}{name}" for name, share in others if share >= 0.1]
-        parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}", *more]
-        sentences[kind] = f"{', '.join(parts)}{over}."
+    for kind, wrong, verb, beside in (
+        ("false", rows["road"][is_other], "is", ""),
+        ("missed", (pixels - rows["road"])[is_road], "lies beside", "beside "),
+    ):
+        if wrong.sum() >= least:
+            shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
+            (first, most), *others = shares.head(NAMED).items()
+            parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}"]
+            parts += [f"{percent(part, 0)} % {beside}{n}" for n, part in others if part >= 0.1]
+            sentences[kind] = f"{', '.join(parts)}{over}."
     return sentences
 
 

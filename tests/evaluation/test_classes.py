@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from roadeval.data import Moment, TruthClass
+from roadeval.evaluation.comparison.compare import compare
 from roadeval.evaluation.score.classes import BESIDE, ClassSums, count_classes
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.tables import by_class
+from roadeval.results.sentences import describe_classes
+from tests.evaluation.making import a_drive, a_result, table_of
 
 SHAPE = 9, 13
 CLASSES = [TruthClass(3, "road", "road"), TruthClass(4, "", "other"), TruthClass(8, "car", "other")]
@@ -69,3 +74,61 @@ def test_classes_that_say_no_more_than_the_truth_have_no_rows():
     sums.add(Moment(0, 0), counts_of((5, 1, 0), (5, 1, 0)))
     assert not [*sums.rows(CLASSES)]
     assert not [*ClassSums().rows(CLASSES)]
+
+
+def classes_of(variant, *rows, names=("road", "verge", "car")):
+    """Rows of ``classes``: value, pixels, pixels called road, and missed road beside it."""
+    columns = ("class", "pixels", "road", "beside")
+    return [
+        dict(zip(columns, row, strict=True))
+        | {"variant": variant, "name": name, "truth": "road" if row[0] == 3 else "other"}
+        | {"frames": 1, "worst": ""}
+        for row, name in zip(rows, names, strict=False)
+    ]
+
+
+def test_shares_of_classes_are_means_over_drives_and_a_class_without_a_name_has_its_number():
+    rows = [
+        *classes_of("mine", (3, 100, 80, 0), (4, 60, 30, 5), (8, 40, 10, 10)),
+        *[
+            row | {"drive": "lane"}
+            for row in classes_of("mine", (3, 50, 50, 0), (4, 50, 8, 0), names=("road", ""))
+        ],
+    ]
+    shares = by_class(table_of("classes", rows))
+    assert shares["false"].to_dict() == {"class 4": 0.5, "verge": 0.375, "car": 0.125, "road": 0}
+    assert shares["missed"].to_dict() == {"class 4": 0, "verge": 0.25, "car": 0.5, "road": 0}
+    assert shares["road"].to_dict() == {"class 4": 0.16, "verge": 0.5, "car": 0.25, "road": 0.9}
+
+
+def test_a_sentence_says_which_class_the_errors_are_if_there_are_any():
+    rows = classes_of("mine", (3, 9000, 8000, 0), (4, 9000, 69, 500), (8, 9000, 31, 20))
+    assert [*describe_classes(table_of("classes", rows), "mine").values()] == [
+        "69 % of the false road is verge, 31 % car.",
+        "50 % of the missed road lies beside verge.",
+    ]
+    few = classes_of("mine", (3, 9000, 8990, 0), (4, 90000, 69, 5))
+    assert not describe_classes(table_of("classes", few), "mine")
+
+
+def test_classes_are_compared_by_their_share_even_if_one_result_lacks_their_names():
+    parts = ((3, 100, 80, 0), (4, 60, 30, 5), (8, 40, 10, 10)), ((3, 100, 80, 0), (4, 60, 6, 5))
+    base, new, same = (
+        a_result(
+            label,
+            a_drive(
+                {("filtered", "post"): [10, 20]},
+                tables={"classes": table_of("classes", classes_of("filtered", *rows, names=names))},
+            ),
+        )
+        for label, rows, names in (
+            ("base", parts[0], ("road", "verge", "car")),
+            ("new", parts[1], ("", "")),
+            ("same", parts[0], ("", "", "")),
+        )
+    )
+    changes = compare([base, new, same], EvaluationSettings()).classes
+    assert [tuple(change) for change in changes] == [
+        ("new", "filtered", "verge", 0.75, 1.0),
+        ("new", "filtered", "car", 0.25, 0.0),
+    ]

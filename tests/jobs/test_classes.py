@@ -1,16 +1,23 @@
 """Classes of a drive's truth in its results: as a plain judge counts them, or none."""
 
+import re
+import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from roadeval import Result, replay
+from roadeval import Result, replay, replay_fleet, write_report
+from roadeval.evaluation.tables import by_class, only
+from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.sentences import describe_classes
+from tests.e2e.test_fleet import Here
 from tests.fixtures.shared import shared
-from tests.jobs.making import settings
+from tests.jobs.making import NS, settings
+from tests.training.making import frame
 
 
 def ids_in(path):
@@ -59,3 +66,51 @@ def test_a_drive_of_plain_masks_has_no_table_of_classes(drive: Path, tmp_path):
     replay(drive, config.override({"only": ["unfiltered"]}), reports=tmp_path / "reports")
     assert not (tmp_path / "reports" / "classes.csv").exists()
     assert Result(tmp_path / "reports").table("classes").empty
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    """A fleet of two drives whose verge is of two classes, the second one rarer in drive b."""
+    folder = tmp_path_factory.mktemp("fleet")
+    logs = folder / "logs"
+    logs.mkdir()
+    for name, width in (("a", 16), ("b", 4)):
+        with LogWriter(logs / f"{name}.mcap") as writer:
+            for number in range(14):
+                made, stamp = frame(number + width), (number + 1) * NS
+                labels = np.where(made.truth == 1, 3, 4).astype(np.uint8)
+                labels[:12, :width] = 8
+                made.image[8:12] = made.image[20:]  # the verge's last rows look like road
+                _, png = cv2.imencode(".png", made.image[..., ::-1])
+                writer.image("/camera/image", stamp, png.tobytes(), "png")
+                writer.mask("/labels", stamp, labels)
+    config = settings(road=["road"], train_frames=4, only=["unfiltered"])
+    config = config.override({"labels": {"names": {"3": "road", "4": "verge", "8": "car"}}})
+    replay_fleet([logs], folder / "f", config, executor=Here())
+    return folder / "f"
+
+
+def test_a_fleet_has_the_classes_of_its_drives_and_says_their_mean(fleet, tmp_path):
+    rows = Result(fleet).table("classes")
+    of_drives = [
+        Result(path).table("classes")
+        for path in sorted((fleet / "results").iterdir())
+        if path.is_dir()
+    ]
+    assert rows["road"].tolist() == [*of_drives[0]["road"], *of_drives[1]["road"]]
+    shares = by_class(only(rows, variant="unfiltered"))["false"]
+    parts = [by_class(only(part, variant="unfiltered"))["false"] for part in of_drives]
+    assert shares["verge"] == pytest.approx((parts[0]["verge"] + parts[1]["verge"]) / 2)
+    sentence = describe_classes(rows, "unfiltered")["false"]
+    assert re.fullmatch(
+        r"6\d % of the false road is verge, 3\d % car \(mean of 2 drives\)\.", sentence
+    )
+    page = write_report(fleet, tmp_path / "fleet.html").read_text()
+    assert sentence in page
+
+
+def test_a_fleet_from_before_classes_were_counted_has_none(fleet, tmp_path):
+    old = shutil.copytree(fleet, tmp_path / "f")
+    shutil.rmtree(old / "classes")
+    assert Result(old).table("classes").empty
+    assert "Which class" not in write_report(old, tmp_path / "fleet.html").read_text()

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -50,6 +50,8 @@ from roadeval.evaluation.tables import (
     COUNTS,
     KEY,
     MASK,
+    by_class,
+    concatenate,
     group_rows,
     is_final,
     keys_of,
@@ -161,6 +163,16 @@ class RegionChange:
     difference: Difference
 
 
+class ClassChange(NamedTuple):
+    """Change of a class's share of a final mask's false road, on all frames of each result."""
+
+    result: str
+    variant: str
+    name: str
+    base: float
+    new: float
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Results compared with the first of them."""
@@ -185,6 +197,8 @@ class Comparison:
     """Sentences on drives and frames that were left out, and on settings and truths that differ."""
     settings: EvaluationSettings
     """The confidence of the intervals, and the frames that they need."""
+    classes: tuple[ClassChange, ...] = ()
+    """The classes of the truth, if it has any, by their share of the new result's false road."""
 
     def finals(self) -> list[MaskChange]:
         """Return the final masks, without the baseline's unless there is no other."""
@@ -253,7 +267,7 @@ def compare(
         changes[place] = replace(changes[place], difference=difference)
     regions = [*chain(*(part.regions for part in parts))]
     corrected = holm([region.difference for region in regions])
-    kinds = ("levels", "drives", "moved", "disagreements", "warnings")
+    kinds = ("levels", "drives", "moved", "disagreements", "warnings", "classes")
     return Comparison(
         results=(parts[0].results[0], *(part.results[1] for part in parts)),
         changed_settings={k: v for part in parts for k, v in part.changed_settings.items()},
@@ -292,7 +306,7 @@ def _compare_two(
     base_keys = {drive.key: old.key for old, drive in matched}
     drive_names = {drive.key: drive.name for drive in new.drives}
     frames = Counter[str]()
-    levels, masks, regions = [], [], []
+    levels, masks, regions, classes = [], [], [], []
     drives: list[DriveChange] = []
     without_frames: list[str] = []
     for batch in _batches(new.scored):
@@ -321,6 +335,8 @@ def _compare_two(
         new_regions = new.table("regions", {key: key for key in new_keys.values()})
         parts = common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups))
+        new_classes = new.table("classes", {key: key for key in new_keys.values()})
+        classes.append((base.table("classes", new_keys), new_classes))
     if not masks:
         raise ComparisonError(
             f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
@@ -346,7 +362,26 @@ def _compare_two(
         disagreements=tuple(disagreed),
         warnings=tuple(_warnings(labels, without_frames, frames, changed)),
         settings=settings,
+        classes=tuple(_class_changes(new.label, *map(concatenate, zip(*classes, strict=True)))),
     )
+
+
+def _class_changes(label: str, base: pd.DataFrame, new: pd.DataFrame) -> Iterator[ClassChange]:
+    """Yield the shares of the false road that are at least a hundredth; one may lack the names."""
+    texts = [*map(str, concatenate([base, new])["name"])]
+    values = [*base["class"], *new["class"]]
+    known = {value: text for value, text in zip(values, texts, strict=True) if text}
+    names = [text or known.get(value, "") for value, text in zip(values, texts, strict=True)]
+    base, new = base.assign(name=names[: len(base)]), new.assign(name=names[len(base) :])
+    for variant in [name for name in values_of(new, "variant") if name != BASELINE]:
+        sides = (by_class(only(rows, variant=variant)) for rows in (base, new))
+        before, after = (shares["false"][shares["truth"] == "other"] for shares in sides)
+        shares = after.to_frame("new").join(before.rename("base"), how="outer").fillna(0)
+        if before.isna().all() or after.isna().all() or shares["new"].equals(shares["base"]):
+            continue
+        for name, row in shares.sort_values("new", ascending=False, kind="stable").iterrows():
+            if row.max() >= 0.01:
+                yield ClassChange(label, variant, str(name), row["base"], row["new"])
 
 
 def _compared_result(side: Side, frames: int, relabelled: int = 0) -> ComparedResult:

@@ -29,13 +29,19 @@ def count_classes(classes: Classes, truth: Truth, masks: Mapping[str, Mask]) -> 
     """
     import cv2
 
-    is_other = truth == NON_ROAD
+    road, reach = truth == ROAD, math.hypot(*truth.shape) / BESIDE
+    left, top, width, height = cv2.boundingRect(road.view(np.uint8))
+    around = math.ceil(reach)
+    near = np.s_[
+        max(0, top - around) : top + height + around, max(0, left - around) : left + width + around
+    ]
+    is_other = truth[near] == NON_ROAD
     distances, numbers = cv2.distanceTransformWithLabels(
         (~is_other).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
     class_of = np.full(numbers.max() + 1, NO_CLASS, np.uint8)
-    class_of[numbers[is_other]] = classes[is_other]
-    band = np.flatnonzero((truth == ROAD) & (distances <= math.hypot(*truth.shape) / BESIDE))
+    class_of[numbers[is_other]] = classes[near][is_other]
+    band = np.flatnonzero(road[near] & (distances <= reach))
     beside = class_of[numbers.ravel()[band]]
     pixels = np.bincount(classes.ravel(), minlength=256)
     return {
@@ -43,7 +49,7 @@ def count_classes(classes: Classes, truth: Truth, masks: Mapping[str, Mask]) -> 
             [
                 pixels,
                 np.bincount(classes[mask.view(np.bool_)], minlength=256),
-                np.bincount(beside[mask.ravel()[band] == 0], minlength=256),
+                np.bincount(beside[mask[near].ravel()[band] == 0], minlength=256),
             ],
             axis=1,
         )
@@ -68,6 +74,8 @@ class ClassSums:
             for is_missed, costs in enumerate((counts[:, 1], missed)):
                 for code in np.flatnonzero(costs[:NO_CLASS]).tolist():
                     worst = self._worst[variant, code, bool(is_missed)]
+                    if len(worst) == SHOWN and costs[code] <= worst[-1][0]:
+                        continue
                     worst.append((int(costs[code]), moment))
                     worst.sort(key=lambda frame: -frame[0])
                     for place, (_, frame) in reversed([*enumerate(worst)]):

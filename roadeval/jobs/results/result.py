@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 OF_ALL: Final = ("code of ", "network ")
 """Beginnings of the names that `input_digests` gives to files of all drives of a fleet."""
-NO_NUMBER: Final = ("output", "run", "fleet")
+NO_NUMBER: Final = ("output", "run", "fleet", "labels.names", "frames.disturb")
 """Tables of a run's settings that change no number."""
 
 
@@ -466,8 +466,7 @@ def number_settings(run: Mapping[str, Any]) -> dict[str, Any]:
             continue
         nested = values.items() if isinstance(values, dict) else [("", values)]
         settings |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
-    settings.pop("frames.disturb", None)
-    return settings
+    return {name: value for name, value in settings.items() if name not in NO_NUMBER}
 
 
 def input_digests(facts: Facts) -> dict[str, str]:
