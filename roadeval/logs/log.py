@@ -30,10 +30,10 @@ from roadeval.logs.frames import (
 )
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
-from roadeval.logs.settings import NS, LabelSettings, LogConfig, MaskSettings, parse_time
+from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
-from roadeval.logs.truth.audits import AuditedLabels
+from roadeval.logs.truth.audits import without_corrections
 from roadeval.logs.truth.label_files import labels_in
 from roadeval.logs.truth.meaning import LabelSource, log_and_topic, source_beside_log
 from roadeval.logs.truth.named_labels import find_keys, shown_name
@@ -213,20 +213,18 @@ class Log:
         missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
         label image has another size, or no mask belongs to a frame.
         """
-        config, folders = self.config, list[str]()
+        config, corrected = self.config, list[str]()
         try:
-            while (audit := AuditedLabels.read(config.truth.path)) is not None:
-                folders.append(config.truth.path)
-                topics = replace(config.topics, truth=audit.topic)
-                labels = config.labels if config.labels != LabelSettings() else audit.labels
-                config = replace(config, truth=audit.truth, topics=topics, labels=labels)
+            while (before := without_corrections(config)) is not None:
+                corrected.append(config.truth.path)
+                config = before
             selection = settle(self.topics, self.readers, config, of_rig=self.of_rig)
             if (place := config.truth).path:
                 settings = MaskSettings(**vars(place), labels=config.labels)
                 truth = self._beside_log(settings, selection, config.topics.sync_offset_ms)
                 selection = replace(selection, labels={TRUTH: truth, **selection.labels})
-            if folders and selection.truth is not None:
-                truth = self._with_corrections(selection.truth, folders, selection)
+            if corrected and selection.truth is not None:
+                truth = self._with_corrections(selection.truth, corrected, selection)
                 selection = replace(selection, labels={**selection.labels, TRUTH: truth})
             masks = {name: self._masks(name, m, selection) for name, m in self.config.masks.items()}
         except LogError as error:

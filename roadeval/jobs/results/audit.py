@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -27,7 +28,7 @@ from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.pick import PNG, open_drives
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs.settings import AUDIT
-from roadeval.logs.truth.audits import AuditedLabels
+from roadeval.logs.truth.audits import FORMAT
 from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import IMAGES, LABELS, PROPOSALS
 from roadeval.logs.truth.shapes import Proposal
@@ -41,9 +42,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SUSPECTS: Final = "suspects"
-"""The folder with a picture of each label that looks wrong, and the name of the table."""
-EDGE: Final = 3
-"""Pixels of the width of lines."""
+"""The folder with a picture of each label that looks wrong."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +94,8 @@ def audit(
         If there are no labels to look at, or the folder holds something else.
     """
     path = Path(source)
+    if folder is not None and Path(folder).exists() and any(Path(folder).iterdir()):
+        raise RoadevalError(f"{folder}: is not empty; name a folder of its own")
     with TemporaryDirectory(prefix="roadeval-") as place:
         drives = open_drives([path], Path(place), config or RunConfig(), on_progress)
         if len(drives) > 1:
@@ -113,7 +114,6 @@ def audit(
         suspects = rank_suspects(concatenate(tables), labelled, count)
         suspects.insert(0, "rank", range(1, len(suspects) + 1))
         suspects["why"] = [describe_suspect(row) for row in records(suspects)]
-        rows = records(suspects)
         sentences = [*drive.facts.misfits, describe_suspects(suspects)]
         for name in annotators:
             if name not in shares:
@@ -121,7 +121,7 @@ def audit(
             share = float(np.mean(shares[name]))
             sentences.append(describe_annotator(name, share, len(shares[name])))
         if folder is not None:
-            _write_audit(drive, rows, Path(folder), labels, run)
+            _write_audit(drive, suspects, Path(folder), labels, run)
         repeats = Path(folder, RUN) if run and folder is not None else None if run else path
         log = drive.facts.log
         return Audit(suspects, labelled, sentences, log.path if log else drive.name, repeats)
@@ -153,25 +153,21 @@ def _labelled_views(
 
 def _write_audit(
     drive: DriveResult,
-    suspects: Sequence[Mapping[str, Any]],
+    suspects: pd.DataFrame,
     folder: Path,
     labels: str,
     run: str | None,
 ) -> None:
     """Write images, labels to correct and pictures, and last what was found."""
-    import pandas as pd
-
-    recording, facts = drive.recording, drive.facts
+    recording, facts, rows = drive.recording, drive.facts, records(suspects)
     assert recording is not None
     if facts.run.get("frames", {}).get("scale", 1) != 1:
         raise RoadevalError("does not go with labels to correct", setting="frames.scale")
-    if folder.exists() and any(folder.iterdir()):
-        raise RoadevalError(f"{folder}: is not empty; name a folder of its own")
     with writing(folder, RoadevalError):
         for part in (IMAGES, PROPOSALS, LABELS, SUSPECTS):
             (folder / part).mkdir(parents=True, exist_ok=True)
         proposals, files = [], dict[str, bytes]()
-        for suspect in suspects:
+        for suspect in rows:
             frame, name = suspect["frame"], f"{suspect['stamp_ns']:019d}.png"
             image, truth = recording.image(frame), recording.truth(frame)
             proposals.append(Proposal(name, truth == ROAD, truth == IGNORE))
@@ -187,11 +183,15 @@ def _write_audit(
             (folder / name).write_bytes(content)
         if run:
             put(folder / RUN, run.encode())
-        csv = pd.DataFrame(rows := [dict(row) for row in suspects]).to_csv(index=False)
-        put(folder / "audit.csv", csv.encode())
-        settings = {name: facts.run.get(name, {}) for name in ("truth", "labels", "topics")}
-        audited = AuditedLabels.of(drive.name, facts.drive.camera, settings, rows)
-        put(folder / AUDIT, audited.text().encode())
+        put(folder / "audit.csv", suspects.to_csv(index=False).encode())
+        about = {
+            "format": FORMAT,
+            "drive": drive.name,
+            "camera": facts.drive.camera,
+            "run": {name: facts.run.get(name, {}) for name in ("truth", "labels", "topics")},
+            "suspects": rows,
+        }
+        put(folder / AUDIT, f"{json.dumps(about, indent=1)}\n".encode())
 
 
 def _mark(image: Image, truth: Plane, suspect: Mapping[str, Any]) -> Image:
@@ -203,5 +203,5 @@ def _mark(image: Image, truth: Plane, suspect: Mapping[str, Any]) -> Image:
     edge = cv2.morphologyEx((truth == ROAD).astype(np.uint8), cv2.MORPH_GRADIENT, square)
     marked[edge > 0] = colours.YELLOW
     corner, opposite = ((suspect[x], suspect[y]) for x, y in (("left", "top"), ("right", "bottom")))
-    cv2.rectangle(marked, corner, opposite, colours.VERMILLION, EDGE)
+    cv2.rectangle(marked, corner, opposite, colours.VERMILLION, 3)
     return marked
