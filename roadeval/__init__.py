@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from roadeval.errors import RoadevalError
     from roadeval.jobs.log_files import demo, info, pack
     from roadeval.jobs.progress import Progress
+    from roadeval.jobs.results.audit import audit
     from roadeval.jobs.results.compare import compare
     from roadeval.jobs.results.pick import pick
     from roadeval.jobs.results.report import write_figures, write_report
@@ -48,6 +49,7 @@ __all__ = [
     "Result",
     "RoadevalError",
     "RunConfig",
+    "audit",
     "compare",
     "config_toml",
     "configure",
@@ -71,6 +73,7 @@ _MODULES: Final = {
     "errors": ("RoadevalError",),
     "jobs.log_files": ("demo", "info", "pack"),
     "jobs.progress": ("Progress",),
+    "jobs.results.audit": ("audit",),
     "jobs.results.compare": ("compare",),
     "jobs.results.pick": ("pick",),
     "jobs.results.report": ("write_figures", "write_report"),

@@ -22,7 +22,7 @@ from roadeval.runtime.text import debug, defect, likely
 
 FIRST: Final = (
     *("replay", "fleet", "report", "inspect", "compare"),
-    *("pick", "info", "train", "config", "pack", "demo"),
+    *("pick", "audit", "info", "train", "config", "pack", "demo"),
 )
 """The order of the commands in the help; others follow by name."""
 COLLECT_EVERY: Final = 400_000

@@ -30,6 +30,7 @@ from roadeval.logs.truth.meaning import (
     ClassMap,
     Labels,
     LabelSource,
+    Meaning,
     check_size,
     class_names,
     meaning_of,
@@ -380,6 +381,7 @@ class Label(NamedTuple):
     """The picture, or why it cannot be read."""
     place: str
     """Its topic or its file, for messages."""
+    meaning: Meaning
 
 
 @dataclass(frozen=True, eq=False)
@@ -455,12 +457,12 @@ class LoggedFrame:
         """Decode a label, and resize it to the image as logged, then as read."""
         import cv2
 
-        picture, place = self.labels[name]
+        picture, place, meaning = self.labels[name]
         if isinstance(picture, FrameError):
             raise picture
         camera = self.selection.camera
         try:
-            label = self.selection.labels[name].meaning.read(picture, camera.images.limits)
+            label = meaning.read(picture, camera.images.limits)
         except BadMessage as error:
             raise FrameError.of(error, place) from error
         theirs, resize = label.truth.shape[1::-1], camera.resize_labels
@@ -500,6 +502,8 @@ class FrameStream:
             name: (source, source.partners(begin, few=few))
             for name, source in selection.labels.items()
         }
+        corrections = truth.corrections if truth else ()
+        self._corrections = [(source, source.partners(begin, few=few)) for source in corrections]
         self._first: dict[int, int] = {}
         """The number of the first frame with a stamp, by the stamp."""
         self._contents: dict[int, int] = {}
@@ -551,8 +555,13 @@ class FrameStream:
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
-            name: Label(read_or_error(source.pictures, at), source.pictures.place(at))
-            for name, (source, partners) in self._labels.items()
+            name: Label(
+                read_or_error(source.pictures, at), source.pictures.place(at), source.meaning
+            )
+            for name, source, partners in (
+                *((name, *labels) for name, labels in self._labels.items()),
+                *((TRUTH, *labels) for labels in reversed(self._corrections)),
+            )
             if (at := partners.of(number)) is not None
         }
         self.accounting.read += 1

@@ -14,6 +14,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from roadeval.data.words import counted
 from roadeval.images.formats import Limits
 from roadeval.logs.container.file import Container, Damage, containers_in, damage_of
 from roadeval.logs.container.records import MAGIC
@@ -32,6 +33,7 @@ from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
+from roadeval.logs.truth.audits import without_corrections
 from roadeval.logs.truth.label_files import labels_in
 from roadeval.logs.truth.meaning import (
     LabelSource,
@@ -216,16 +218,41 @@ class Log:
         missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
         label image has another size, or no mask belongs to a frame.
         """
+        config, corrected = self.config, list[str]()
         try:
-            selection = settle(self.topics, self.readers, self.config, of_rig=self.of_rig)
-            if (place := self.config.truth).path:
-                settings = MaskSettings(**vars(place), labels=self.config.labels)
-                truth = self._beside_log(settings, selection, self.config.topics.sync_offset_ms)
+            while (before := without_corrections(config)) is not None:
+                corrected.append(config.truth.path)
+                config = before
+            selection = settle(self.topics, self.readers, config, of_rig=self.of_rig)
+            if (place := config.truth).path:
+                settings = MaskSettings(**vars(place), labels=config.labels)
+                truth = self._beside_log(settings, selection, config.topics.sync_offset_ms)
                 selection = replace(selection, labels={TRUTH: truth, **selection.labels})
+            if corrected and selection.truth is not None:
+                truth = self._with_corrections(selection.truth, corrected, selection)
+                selection = replace(selection, labels={**selection.labels, TRUTH: truth})
             masks = {name: self._masks(name, m, selection) for name, m in self.config.masks.items()}
         except LogError as error:
             raise LogError.of(error, self.path.name) from error
         return replace(selection, labels={**selection.labels, **masks})
+
+    def _with_corrections(
+        self, truth: LabelSource, folders: Sequence[str], selection: Selection
+    ) -> LabelSource:
+        """Return the truth with the labels in some folders in place of its own."""
+        sources = [self._beside_log(MaskSettings(path=path), selection) for path in folders]
+        notes = [
+            f"corrected labels of {counted(len(source.pictures), 'frame')} from {source.where}; "
+            f"all other frames have those of {truth.where}"
+            for source in sources
+        ]
+
+        def digest() -> str:
+            parts = [source.digest() for source in (truth, *sources) if source.digest]
+            return hashlib.sha256(" ".join(parts).encode()).hexdigest()
+
+        all_notes = *truth.notes, *notes
+        return replace(truth, digest=digest, notes=all_notes, corrections=tuple(sources))
 
     def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> LabelSource:
         """Read masks that lie beside the log; their messages name the settings of their variant."""

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from annotated_types import Interval, Len
@@ -317,6 +318,10 @@ class FrameSettings:
     white: Annotated[float | None, Interval(gt=0), Flag("--white", "V", "Input")] = None
 
 
+AUDIT: Final = "audit.json"
+"""The file in a folder of labels to correct: the drive's own labels are read, too."""
+
+
 @dataclass(frozen=True)
 class LogConfig:
     """All settings of reading a log."""
@@ -330,7 +335,8 @@ class LogConfig:
     ground: GroundSettings = field(default_factory=GroundSettings)
 
     def __post_init__(self) -> None:
-        if self.truth.path and self.topics.truth:
+        is_audit = Path(self.truth.path, AUDIT).is_file()
+        if self.truth.path and self.topics.truth and not is_audit:
             raise LogError(
                 Sentence("says where the truth is, and so does {topics.truth}"),
                 setting="truth.path",

@@ -95,31 +95,11 @@ def pick(
     RoadevalError
         If nothing can be picked, with what to do.
     """
-    from roadeval.jobs.run.replay import replay
-
     sources = [source] if isinstance(source, str | PathLike) else [*source]
     if not sources:
         raise RoadevalError("nothing to pick from: name a result, a log or a fleet")
     with TemporaryDirectory(prefix="roadeval-") as place:
-        drives, config = [], config or RunConfig()
-        masks = config.override({"output": {"record": "masks", "figures": False}})
-        for number, path in enumerate(
-            part for one in sources for part in _find_recordings(Path(one))
-        ):
-            made, run = path, None
-            if path.suffix != ".rrd":
-                made, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
-                own_reports = Path(place, "reports")
-                replay(path, masks, save=made, reports=own_reports, on_progress=on_progress)
-            drive = Result(made).drive
-            if drive is None or drive.recording is None:
-                raise RoadevalError(
-                    f"{made}: frames are picked from a recording of one camera; give the log, and "
-                    "of several cameras one with --image-topic"
-                )
-            drives.append((path, drive, run))
-        if not drives:
-            raise RoadevalError(f"{sources[0]}: no recording was kept; replay it with --keep all")
+        drives = open_drives(sources, Path(place), config or RunConfig(), on_progress)
         many = len(drives) > 1
         names = [drive.name for _, drive, _ in drives]
         if len({*names}) < len(names):
@@ -133,6 +113,34 @@ def pick(
             for (path, drive, run), share in zip(drives, _share_out(lengths, count), strict=True)
             if share
         ]
+
+
+def open_drives(
+    sources: Sequence[AnyPath], place: Path, config: RunConfig, on_progress: OnProgress
+) -> list[tuple[Path, DriveResult, str | None]]:
+    """Open the recordings of some results; a log is replayed into a folder.
+
+    Returned are each one's path, its result, and the configuration of a log that was replayed.
+    """
+    from roadeval.jobs.run.replay import replay
+
+    drives = []
+    masks = config.override({"output": {"record": "masks", "figures": False}})
+    for number, path in enumerate(part for one in sources for part in _find_recordings(Path(one))):
+        made, run = path, None
+        if path.suffix != ".rrd":
+            made, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
+            replay(path, masks, save=made, reports=Path(place, "reports"), on_progress=on_progress)
+        drive = Result(made).drive
+        if drive is None or drive.recording is None:
+            raise RoadevalError(
+                f"{made}: frames are picked from a recording of one camera; give the log, and "
+                "of several cameras one with --image-topic"
+            )
+        drives.append((path, drive, run))
+    if not drives:
+        raise RoadevalError(f"{sources[0]}: no recording was kept; replay it with --keep all")
+    return drives
 
 
 def _find_recordings(source: Path) -> list[Path]:

@@ -19,10 +19,10 @@ from roadeval.images.formats import ImageError, Limits, Size
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
-from roadeval.logs.settings import MaskSettings
+from roadeval.logs.settings import AUDIT, MaskSettings
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.named_labels import LabelSet, NamedLabel
-from roadeval.logs.truth.picks import LABELS, PICK
+from roadeval.logs.truth.picks import LABELS, PICK, PROPOSALS
 from roadeval.logs.truth.shapes import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.runtime.discovery import collect
 from roadeval.runtime.documents import read_bounded, read_json
@@ -38,15 +38,18 @@ _UNREADABLE: Final = (*_BAD_FORMAT, LogError, BadMessage, ImageError)
 
 
 def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = None) -> LabelSet:
-    """List the labels in a folder or a file; for picked frames those in their folder of labels.
+    """List the labels in a folder or a file; for labels to correct those in their own folder.
 
     Files of an annotation tool come before images, which may be the annotated ones. If the folder
     itself has no labels, the folders below it are searched. ``size`` is the width and height of the
     log's images, if known: some formats have shares of it. The settings decide which shapes are on
     top, and which may be left out. A `LogError` if there is no label, or a file cannot be read.
     """
-    if (path / PICK).is_file():
+    if any((path / name).is_file() for name in (PICK, AUDIT)):
         path /= LABELS
+        if path.is_dir() and not any(path.iterdir()):
+            remedy = f"correct those in {PROPOSALS}, and put the results into {LABELS}"
+            raise LogError("no label in it yet", where=path, remedy=remedy)
     if path.is_file() and path.suffix.lower() not in _formats():
         names = sorted({format_.name for formats in _formats().values() for format_ in formats})
         listing = ", ".join(names)

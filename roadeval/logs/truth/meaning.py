@@ -341,18 +341,20 @@ def find_meaning(
 def find_class_meaning(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
     """Find the meaning of drawn labels by the names of their classes.
 
-    If the only class is called road, it means road. A `LogError` if the settings name no class of
-    road, or one that does not occur.
+    If the only class is called road, it means road, and one that is called ignore beside it is
+    ignored. A `LogError` if the settings name no class of road, or one that does not occur.
     """
     classes = origin.classes
-    road = labels.road or (("road",) if {*classes} == {"road"} else ())
+    road, ignored = labels.road, labels.ignore
+    if not road and {"road"} <= classes.keys() <= {"road", "ignore"}:
+        road, ignored = ("road",), ignored or tuple({"ignore"} & classes.keys())
     there = _counted(origin, classes)
     if not road:
         raise UnclearLabelsError(f"{name} has the classes {there}", remedy=NAME_THEM)
     if origin.lost:
         there += f"; {counted(origin.lost, 'label')} of it cannot be read"
     # The name of a class may be a number.
-    names = map(str, road), map(str, labels.ignore)
+    names = map(str, road), map(str, ignored)
     meaning = _as_named(*names, classes, f"{name}, which has the classes {there}")
     rest = [label for label in classes if classes[label] not in meaning.meaning]
     words = f"; non-road is all else, {_counted(origin, rest)}" if rest else ""
@@ -462,6 +464,8 @@ class LabelSource:
     """Computes the digest in hexadecimal of labels beside the log."""
     notes: tuple[str, ...] = ()
     """Warnings about labels beside the log, a sentence each."""
+    corrections: tuple[LabelSource, ...] = ()
+    """Labels that replace those of their frames; the first that has one counts."""
 
     @property
     def is_confidence(self) -> bool:

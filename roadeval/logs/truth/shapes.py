@@ -228,6 +228,8 @@ class Proposal(NamedTuple):
     """The name of the image's file."""
     road: Mask
     """``(H, W)``."""
+    ignored: Mask | None = None
+    """``(H, W)``, if pixels may be ignored."""
 
     @property
     def size(self) -> Size:

@@ -101,23 +101,31 @@ def lengths_in(text: str) -> Sequence[int]:
 
 
 def as_coco(proposals: Sequence[shapes.Proposal]) -> dict[str, bytes]:
-    """Return one file by its name, with a region of uncompressed runs for each image."""
-    images, annotations = [], []
+    """Return one file by its name, with a region of uncompressed runs for road in each image.
+
+    Ignored pixels are a second region, of the class ``ignore``.
+    """
+    images, annotations, classes = list[Any](), list[Any](), ["road"]
     for number, proposal in enumerate(proposals, 1):
         width, height = proposal.size
-        rows, columns = (np.flatnonzero(proposal.road.any(axis=axis)).tolist() for axis in (1, 0))
-        box = [0, 0, 0, 0]
-        if rows:
-            left, top = columns[0], rows[0]
-            box = [left, top, columns[-1] + 1 - left, rows[-1] + 1 - top]
         images.append({"id": number, "file_name": proposal.image, "width": width, "height": height})
-        about = {"id": number, "image_id": number, "category_id": 1, "iscrowd": 1}
-        runs = {"size": [height, width], "counts": proposal.runs(by_columns=True)}
-        annotations.append(
-            {**about, "area": int(proposal.road.sum()), "bbox": box, "segmentation": runs}
-        )
+        areas = [proposal.road]
+        if proposal.ignored is not None and proposal.ignored.any():
+            areas.append(proposal.ignored)
+            classes = ["road", "ignore"]
+        for category, area in enumerate(areas, 1):
+            rows, columns = (np.flatnonzero(area.any(axis=axis)).tolist() for axis in (1, 0))
+            box = [0, 0, 0, 0]
+            if rows:
+                left, top = columns[0], rows[0]
+                box = [left, top, columns[-1] + 1 - left, rows[-1] + 1 - top]
+            about = {"id": len(annotations) + 1, "image_id": number, "category_id": category}
+            counts = proposal._replace(road=area).runs(by_columns=True)
+            runs = {"size": [height, width], "counts": counts}
+            shape = {"iscrowd": 1, "area": int(area.sum()), "bbox": box, "segmentation": runs}
+            annotations.append({**about, **shape})
     content = {"images": images, "annotations": annotations}
-    content["categories"] = [{"id": 1, "name": "road"}]
+    content["categories"] = [{"id": place, "name": name} for place, name in enumerate(classes, 1)]
     return {"instances.json": json.dumps(content).encode()}
 
 

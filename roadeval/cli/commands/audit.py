@@ -1,0 +1,114 @@
+"""``roadeval audit``: labels that look wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from shlex import join, quote
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import OptionValues, takes
+
+if TYPE_CHECKING:
+    from roadeval.jobs.results.audit import Audit
+
+
+@takes(
+    *("truth", "labels", "topics.truth", "topics.sync_tolerance_ms", "topics.resize_truth"),
+    *("preset", "config", "variants", "nets", "masks", "topics.masks", "cameras", "run.jobs"),
+)
+def audit(
+    source: Annotated[
+        Path,
+        arguments.argument(
+            "DRIVE|RESULT", "A camera log (MCAP), which is replayed first, or a result of it."
+        ),
+    ],
+    *,
+    count: Annotated[
+        int, arguments.option("-n --count", "Most labels to name.", "N", min=1, max=100_000)
+    ] = 20,
+    output: Annotated[
+        Path | None, arguments.option("-o --output", "Folder for labels to correct.", "FOLDER")
+    ] = None,
+    form: Annotated[
+        Literal["png", "coco"], arguments.option("--format", "Format of the labels to correct.")
+    ] = "png",
+    annotators: Annotated[
+        list[str] | None,
+        arguments.option(
+            "--annotator", "Masks that are another person's labels. Repeatable.", "NAME"
+        ),
+    ] = None,
+    options: OptionValues,
+    json: arguments.Json = False,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Find labels that look wrong, and write them for correction.
+
+        roadeval audit drive.mcap --truth labels/ -o to_check
+        roadeval audit recordings/drive.rrd --annotator b
+
+    A label looks wrong where methods that are right elsewhere agree against it, where it differs
+    from the labels before and after though the picture does not change, where it has specks, holes
+    or cut edges, and where another frame, a mirror or a move explains it. FOLDER/suspects shows
+    where, FOLDER/proposals has the present labels; put the corrected ones into FOLDER/labels.
+    'replay --truth FOLDER' then reads these in place of the drive's own.
+    """
+    arguments.check_one_camera(options)
+    config = arguments.configuration(options)
+    from roadeval.jobs.results.audit import audit as run
+    from roadeval.results.facts import json_text, plain
+    from roadeval.results.rows import records
+
+    with progress.show(quiet) as watch:
+        found = run(
+            *(source, count, output, config),
+            labels=form,
+            annotators=annotators or (),
+            on_progress=watch,
+        )
+    if json:
+        about = {"labels": found.labels, "sentences": found.sentences}
+        about["suspects"] = records(found.suspects)
+        console.emit(json_text(plain(about)).rstrip())
+    elif not quiet:
+        _show(found, output)
+    messages.warn_of_missing_loops()
+    return ExitCode.DONE
+
+
+def _show(found: Audit, output: Path | None) -> None:
+    """Print the labels that look wrong, and what to do with them."""
+    from roadeval.cli.screens.tables import show_table
+    from roadeval.report.blocks import Table
+
+    out = console.results()
+    for sentence in found.sentences:
+        console.say(sentence, out)
+    rows = found.suspects
+    if not len(rows):
+        return
+    columns = {
+        "": rows["rank"],
+        "frame": rows["frame"],
+        "wrong": rows["clear"].map({True: "clearly", False: "perhaps"}),
+        "columns, rows": [f"{r.left}-{r.right}, {r.top}-{r.bottom}" for r in rows.itertuples()],
+        "why": rows["why"],
+    }
+    cells = [[str(cell) for cell in row] for row in zip(*columns.values(), strict=True)]
+    out.print()
+    show_table(Table([*columns], cells, text_columns=[2, 3, 4]), out)
+    out.print()
+    if output is None:
+        out.print("-o FOLDER writes these labels for correction, with pictures.")
+        return
+    console.say(
+        f"Look at {output}/suspects. Correct what is wrong in {output}/proposals, and put the "
+        f"results into {output}/labels.",
+        out,
+    )
+    config = f" --config {quote(str(found.config))}" if found.config else ""
+    command = f"roadeval replay {join([found.log])}{config} --truth {quote(str(output))}"
+    console.show_next(out, command)

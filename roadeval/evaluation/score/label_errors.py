@@ -1,0 +1,320 @@
+"""Labels that look wrong: areas where the truth contradicts what tells it well elsewhere.
+
+Methods and the labels of the frames before and after, moved with the picture, predict each label.
+A prediction counts by how rarely it is wrong there on other frames, the near ones above all: what a
+method always gets wrong is no sign against a label.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import IGNORE, ROAD
+from roadeval.data.arrays import Flags, Image, Plane, Values
+from roadeval.evaluation.tables import near_ns, separate
+
+if TYPE_CHECKING:
+    import cv2
+    import pandas as pd
+
+BLOCK: Final = 400
+"""Number of successive labels that are examined together, which bounds the memory."""
+_WIDEST: Final = 320
+"""Greatest width of examined images in pixels; larger ones are reduced."""
+_CELL: Final = 8
+"""Pixels of a side of the squares in which the errors of a prediction are counted."""
+_NEAR: Final = 5
+"""Number of labels before and after one that count as near."""
+_LEAST: Final = 0.02
+"""Least share of errors that is believed of any prediction."""
+_STILL: Final = 12
+"""Greatest mean difference, in grey levels, of a place from the same place in the next image."""
+_AGAINST: Final = 1.0
+"""Log odds above which a pixel's label looks wrong."""
+_SMALL: Final = 0.0015
+"""Greatest share of the image of a speck or a hole."""
+_SPECKS: Final = 4
+"""Weight of specks and holes: no method and no scene has many, so few pixels say much."""
+_REACH: Final = 12
+"""Greatest move that explains a label, in pixels."""
+_LONG: Final = 15
+"""Least number of pixels of an edge that counts as a cut."""
+_UNKNOWN: Final = 255
+"""Stands for a prediction that says nothing."""
+_FLOOR: Final = 0.0025
+"""Score, per pixel, below which no label differs from any other."""
+_CLEAR: Final = 4
+"""Multiple of the usual score of a drive from which a label is clearly wrong."""
+_MUCH: Final = 10
+"""That multiple for the `_DOUBTFUL` reasons."""
+
+
+class Reason(StrEnum):
+    """Why a label looks wrong."""
+
+    ANOTHER_FRAME = "another_frame"
+    MIRRORED = "mirrored"
+    MOVED = "moved"
+    SPECKS = "specks"
+    CUT = "cut"
+    SHADOW = "shadow"
+    JUMP = "jump"
+    METHODS = "methods"
+
+
+_DOUBTFUL: Final = (Reason.CUT, Reason.SHADOW, Reason.METHODS)
+"""Reasons that a method's own mistake may look like."""
+
+
+class Suspect(NamedTuple):
+    """A label that looks wrong: a row of the table of suspects."""
+
+    frame: int
+    stamp_ns: int
+    reason: str
+    """A `Reason`."""
+    detail: str
+    """The other frame's number, or the move in pixels; else empty."""
+    top: int
+    left: int
+    bottom: int
+    right: int
+    """The area in pixels; the last two are the first row and column behind it."""
+    pixels: int
+    """Pixels that look wrong."""
+    score: float
+    """Summed log odds against the label, per pixel of the image."""
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledView:
+    """A labelled frame at the size in which it is examined: ``(H, W)`` each, 0 to 255."""
+
+    frame: int
+    stamp_ns: int
+    grey: Plane
+    road: Plane
+    ignored: Plane
+    masks: Mapping[str, Plane]
+    """The final masks of methods by their names, 0 to 254."""
+    times: int
+    """Number of columns, and of rows, that became one."""
+
+    @classmethod
+    def of(
+        cls, frame: int, stamp_ns: int, image: Image, truth: Plane, masks: Mapping[str, Plane]
+    ) -> LabelledView:
+        """Reduce an ``(H, W, 3)`` image, its truth and the masks (0, 1) of methods."""
+        import cv2
+
+        times = -(-image.shape[1] // _WIDEST)
+        size = max(image.shape[1] // times, 1), max(image.shape[0] // times, 1)
+
+        def reduced(plane: Plane) -> Plane:
+            return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+        road, ignored = (reduced((truth == code) * np.uint8(255)) for code in (ROAD, IGNORE))
+        small = {name: reduced(mask * np.uint8(_UNKNOWN - 1)) for name, mask in masks.items()}
+        grey = reduced(np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8))
+        return cls(frame, stamp_ns, grey, road, ignored, small, times)
+
+
+def find_suspects(views: Sequence[LabelledView]) -> pd.DataFrame:
+    """Return a `Suspect` for each label with an area that looks wrong, in the order of the views.
+
+    The views are successive labelled frames of one size; more of them tell more.
+    """
+    import pandas as pd
+
+    against = np.zeros((len(views), *views[0].road.shape), np.float32)
+    for name in dict.fromkeys(name for view in views for name in view.masks):
+        _add_evidence(against, views, [view.masks.get(name) for view in views])
+    jumps = np.ones(against.shape, np.bool_)
+    for step in (-1, 1):
+        carried = [_carry_label(views, place, place + step) for place in range(len(views))]
+        jumps &= _add_evidence(against, views, carried)
+    roads = np.array([view.road > 127 for view in views])
+    suspects = (
+        _suspect(views, place, roads, against[place], jumps[place]) for place in range(len(views))
+    )
+    return pd.DataFrame([*filter(None, suspects)], columns=[*Suspect._fields])
+
+
+def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFrame:
+    """Return at most ``count`` suspects of all ``labels``, the worst first and one a scene.
+
+    The column ``clear`` is whether a label is clearly wrong, not only worth a look.
+    """
+    scores = np.zeros(max(labels, 1))
+    scores[: len(suspects)] = suspects["score"]
+    usual = _FLOOR + float(np.median(scores))
+    least = np.where(suspects["reason"].isin(_DOUBTFUL), _MUCH, _CLEAR)
+    suspects = suspects.assign(clear=suspects["score"] > least * usual)
+    suspects = suspects[suspects["score"] > usual]
+    stamps = suspects["stamp_ns"].to_numpy(np.int64)
+    ranked = np.lexsort((-suspects["score"], ~suspects["clear"]))
+    apart = near_ns(stamps)
+    places = separate(stamps, ranked, count, apart)
+    while apart and len(places) < min(count, len(suspects)):
+        apart //= 2
+        places = separate(stamps, ranked, count, apart)
+    return suspects.iloc[places].reset_index(drop=True)
+
+
+def _carry_label(views: Sequence[LabelledView], place: int, other: int) -> Plane | None:
+    """Return the label of another frame as it moves with the picture; `_UNKNOWN` where it is not.
+
+    Where the moved picture does not look
+    like this frame's, nothing is known.
+    """
+    import cv2
+
+    if not 0 <= other < len(views):
+        return None
+    view, near = views[place], views[other]
+    flow = _flow().calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
+    height, width = view.grey.shape
+    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    x, y = x + flow[..., 0], y + flow[..., 1]
+    grey, road, ignored = (
+        cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        for plane in (near.grey, near.road, near.ignored)
+    )
+    unlike = cv2.blur(cv2.absdiff(grey, view.grey).astype(np.float32), (9, 9)) >= _STILL
+    outside = (x < -1) | (x > width) | (y < -1) | (y > height)
+    carried = np.minimum(road, _UNKNOWN - 1)
+    carried[unlike | outside | (ignored > 0)] = _UNKNOWN
+    return np.asarray(carried, np.uint8)
+
+
+def _add_evidence(
+    against: Values, views: Sequence[LabelledView], predictions: Sequence[Plane | None]
+) -> npt.NDArray[np.bool_]:
+    """Add to the log odds ``against`` each label what a prediction says of it.
+
+    Returned is where the prediction alone is sure that the labels are wrong, ``(n, H, W)``.
+    """
+    import cv2
+
+    height, width = views[0].road.shape
+    cells = max(width // _CELL, 1), max(height // _CELL, 1)
+    gaps = np.zeros(against.shape, np.float32)
+    known = np.zeros(against.shape, np.bool_)
+    sums = np.zeros((2, len(views), cells[1], cells[0]))
+    for place, (view, prediction) in enumerate(zip(views, predictions, strict=True)):
+        if prediction is None:
+            continue
+        known[place] = (view.ignored == 0) & (prediction != _UNKNOWN)
+        gaps[place] = cv2.absdiff(prediction, view.road) / np.float32(255) * known[place]
+        for number, plane in enumerate((gaps[place], known[place].astype(np.float32))):
+            small = cv2.resize(plane, cells, interpolation=cv2.INTER_AREA)
+            sums[number, place] = cv2.blur(small, (3, 3))
+    others = sums.sum(axis=1, keepdims=True) - sums
+    before = np.pad(sums.cumsum(axis=1), ((0, 0), (1, 0), (0, 0), (0, 0)))
+    places = np.arange(len(views))
+    ends = np.minimum(places + _NEAR + 1, len(views)), np.maximum(places - _NEAR, 0)
+    near = before[:, ends[0]] - before[:, ends[1]] - sums
+    # Half a frame of errors in one frame is what is believed before any frame is seen.
+    errors, near_errors = ((part[0] + 0.5) / (part[1] + 1) for part in (others, near))
+    share = np.clip(np.maximum(errors, near_errors) + _LEAST, _LEAST, 0.5)
+    odds = np.log((1 - share) / share).astype(np.float32)
+    for place in range(len(views)):
+        weight = cv2.resize(odds[place], (width, height), interpolation=cv2.INTER_LINEAR)
+        gaps[place] = weight * (2 * gaps[place] - 1) * known[place]
+        against[place] += gaps[place]
+    return np.asarray(gaps > _AGAINST)
+
+
+def _suspect(
+    views: Sequence[LabelledView], place: int, roads: Flags, against: Values, jump: Flags
+) -> Suspect | None:
+    """Return the area of a label that looks most wrong, and why; None if no pixel does."""
+    import cv2
+
+    view, road, wrong = views[place], roads[place], (against > _AGAINST).astype(np.uint8)
+    small = np.zeros(road.shape, np.bool_)
+    for side in (road, ~road):
+        _, parts, stats, _ = cv2.connectedComponentsWithStats(side.astype(np.uint8), connectivity=4)
+        small |= (stats[:, cv2.CC_STAT_AREA] < _SMALL * road.size)[parts]
+    count, areas, stats, _ = cv2.connectedComponentsWithStats(wrong, connectivity=4)
+    sizes = stats[:, cv2.CC_STAT_AREA]
+    is_speck = np.bincount(areas.ravel(), small.ravel(), count) > 0.5 * sizes
+    core = cv2.morphologyEx(wrong, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    counted = np.where(core | is_speck[areas], np.maximum(against - _AGAINST, 0), 0)
+    scores = np.bincount(areas.ravel(), counted.ravel(), count) * np.where(is_speck, _SPECKS, 1)
+    scores[(sizes < 4) | (np.arange(count) == 0)] = 0
+    if not scores.any():
+        return None
+    area = areas == scores.argmax()
+    reason, detail = _explain(views, place, roads, wrong > 0)
+    if reason is not None:
+        area = scores[areas] > 0
+    elif scores[is_speck].sum() > 0.5 * scores.sum():
+        reason, area = Reason.SPECKS, (is_speck & (scores > 0))[areas]
+    else:
+        reason = _look_at(view, road, area, jump)
+    rows, columns = (np.flatnonzero(area.any(axis=axis)) * view.times for axis in (1, 0))
+    ends = int(rows[-1]) + view.times, int(columns[-1]) + view.times
+    top, left, pixels = int(rows[0]), int(columns[0]), int(area.sum()) * view.times**2
+    score = float(scores.sum()) / road.size
+    return Suspect(view.frame, view.stamp_ns, reason, detail, top, left, *ends, pixels, score)
+
+
+def _explain(
+    views: Sequence[LabelledView], place: int, roads: Flags, wrong: Flags
+) -> tuple[Reason | None, str]:
+    """Return which one mistake makes a label as it is; the number of the frame, or the move."""
+    import cv2
+
+    view, road = views[place], roads[place]
+    expected, before = road ^ wrong, float(wrong.mean())
+    if before < _SMALL or min(road.shape) <= 2 * _REACH:
+        return None, ""
+    unlike = (roads ^ road).mean(axis=(1, 2))
+    unlike[place] = 1
+    if unlike.min() < 0.1 * before:
+        return Reason.ANOTHER_FRAME, str(views[unlike.argmin()].frame)
+    seen = view.ignored == 0
+    if ((road[:, ::-1] ^ expected) & seen).mean() < 0.5 * before:
+        return Reason.MIRRORED, ""
+    inner = expected[_REACH:-_REACH, _REACH:-_REACH].astype(np.float32)
+    misfits = cv2.matchTemplate(road.astype(np.float32), inner, cv2.TM_SQDIFF)
+    down, right = (int(at) - _REACH for at in np.unravel_index(misfits.argmin(), misfits.shape))
+    if max(abs(down), abs(right)) > 1 and misfits.min() < 0.5 * misfits[_REACH, _REACH]:
+        return Reason.MOVED, f"{right * view.times},{down * view.times}"
+    return None, ""
+
+
+def _look_at(view: LabelledView, road: Flags, area: Flags, jump: Flags) -> Reason:
+    """Return why an area of a label looks wrong, by its edge and by the picture."""
+    import cv2
+
+    if jump[area].mean() > 0.5:
+        return Reason.JUMP
+    cross = np.ones((3, 3), np.uint8)
+    edge = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_GRADIENT, cross) > 0
+    rim = edge & (cv2.dilate(area.astype(np.uint8), cross) > 0)
+    y, x = np.nonzero(rim)
+    slopes = cv2.morphologyEx(cv2.GaussianBlur(view.grey, (5, 5), 1), cv2.MORPH_GRADIENT, cross)
+    is_removed = not road[area].mean() > 0.5
+    if is_removed and len(x) >= _LONG:
+        across = float(np.sqrt(np.linalg.eigvalsh(np.cov(x, y))[0]))
+        if across < 1.5 and slopes[rim].mean() < 0.5 * slopes[edge & ~rim].mean():
+            return Reason.CUT
+    if is_removed and road.any() and view.grey[area].mean() < 0.75 * view.grey[road].mean():
+        return Reason.SHADOW
+    return Reason.METHODS
+
+
+@cache
+def _flow() -> cv2.DISOpticalFlow:
+    import cv2
+
+    return cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)

@@ -1,0 +1,59 @@
+"""Labels that look wrong, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.data.words import counted, first_of, percent
+from roadeval.evaluation.score.label_errors import Reason
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_REASONS: Final[Mapping[str, str]] = {
+    Reason.ANOTHER_FRAME: "it is the label of frame {}",
+    Reason.MIRRORED: "left and right are exchanged",
+    Reason.MOVED: "it lies {} of its place",
+    Reason.SPECKS: "specks or holes that nothing else has",
+    Reason.CUT: "the road ends at a straight edge that the picture lacks",
+    Reason.SHADOW: "the road ends at something dark, as a shadow",
+    Reason.JUMP: "the labels before and after differ, the picture does not",
+    Reason.METHODS: "methods that are right here elsewhere differ",
+}
+
+
+def describe_suspect(suspect: Mapping[str, Any]) -> str:
+    """Return why a label looks wrong, by a row of the suspects.
+
+    >>> describe_suspect({"reason": "moved", "detail": "12,-4"})
+    'it lies 12 px right and 4 px above of its place'
+    """
+    detail = str(suspect["detail"])
+    if suspect["reason"] == Reason.MOVED:
+        right, down = map(int, detail.split(","))
+        ways = (right, ("right", "left")), (down, ("below", "above"))
+        detail = " and ".join(f"{abs(by)} px {words[by < 0]}" for by, words in ways if by)
+    return _REASONS[suspect["reason"]].format(detail)
+
+
+def describe_suspects(suspects: pd.DataFrame) -> str:
+    """Return in which frames the label is clearly wrong, by the ranked suspects."""
+    frames = sorted(suspects[suspects["clear"]]["frame"].tolist())
+    if not frames:
+        return "No label is clearly wrong."
+    verb = "looks" if len(frames) == 1 else "look"
+    noun = "The label of 1 frame" if len(frames) == 1 else f"The labels of {len(frames)} frames"
+    return f"{noun} {verb} wrong: {first_of([*map(str, frames)], 10)}."
+
+
+def describe_annotator(name: str, share: float, frames: int) -> str:
+    """Return what the share of pixels on which two people's labels differ means.
+
+    >>> print(describe_annotator("b", 0.009, 20).partition(":")[0])
+    b and the truth differ on 0.9 % of the pixels of 20 frames
+    """
+    return (
+        f"{name} and the truth differ on {percent(share, 1)} % of the pixels of "
+        f"{counted(frames, 'frame')}: differences of ERR below that mean nothing."
+    )

@@ -1,0 +1,163 @@
+"""Labels that look wrong are written for correction, and read back in place of the drive's own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import roadeval
+from roadeval import RoadevalError, RunConfig
+from roadeval.jobs.results.audit import Audit
+from roadeval.logs.log import describe
+from roadeval.logs.writing.writer import LogWriter
+from tests.evaluation.test_label_errors import FRAMES, image_at, method_at, road_at, wrong_labels
+from tests.jobs.making import settings
+
+NS = 100_000_000
+IGNORED = slice(0, 10)
+"""The rows that nobody labelled."""
+CODES = {"labels": {"road": [3], "ignore": [11]}}
+
+
+def stamp_of(frame: int) -> int:
+    return (frame + 1) * NS
+
+
+def label_of(frame: int, *, is_wrong: bool = False) -> np.ndarray:
+    """The class ids of a frame's label: 3 is road, and 11 ignored."""
+    road = wrong_labels()[frame][1] if is_wrong and frame in wrong_labels() else road_at(frame)
+    label = np.where(road == 1, 3, 5).astype(np.uint8)
+    label[IGNORED] = 11
+    return label
+
+
+def with_masks(base: Path, *names: str) -> RunConfig:
+    """Settings of a run with masks from folders alone, which is quick."""
+    masks = {name: {"path": str(base / name)} for name in names}
+    return settings(record="masks").override({"masks": masks, "only": [*names]})
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drive with five wrong labels, another person's labels, and the recording."""
+    base = tmp_path_factory.mktemp("audit")
+    for name in ("mine", "b"):
+        (base / name).mkdir()
+    with LogWriter(base / "drive.mcap") as log:
+        for frame in range(FRAMES):
+            png = cv2.imencode(".png", image_at(frame))[1].tobytes()
+            log.image("/camera", stamp_of(frame), png, "png")
+            log.mask("/truth/road", stamp_of(frame), label_of(frame, is_wrong=True))
+            second = road_at(frame)
+            second[70:, :40] = 0
+            for name, mask in (("mine", method_at(frame)), ("b", second)):
+                cv2.imwrite(str(base / name / f"{stamp_of(frame):019d}.png"), mask * 255)
+    config = with_masks(base, "mine", "b").override(CODES)
+    save, reports = base / "drive.rrd", base / "reports"
+    roadeval.replay(base / "drive.mcap", config, save=save, reports=reports)
+    return base
+
+
+@pytest.fixture(scope="module", params=["png", "coco"])
+def audited(request: pytest.FixtureRequest, place: Path) -> tuple[Audit, Path]:
+    folder = place / request.param
+    found = roadeval.audit(
+        place / "drive.rrd", folder=folder, labels=request.param, annotators=["b"]
+    )
+    return found, folder
+
+
+def truths(place: Path, folder: Path, tmp_path: Path) -> dict[int, np.ndarray]:
+    """The truth of each frame in a replay with the corrected labels."""
+    config = with_masks(place, "mine").override({"truth": {"path": str(folder)}})
+    done = roadeval.replay(
+        place / "drive.mcap", config, save=tmp_path / "o.rrd", reports=tmp_path / "r"
+    )
+    said = [text for text in done.warnings if "corrected labels" in text]
+    assert len(said) == 1
+    assert said[0].endswith("all other frames have those of /truth/road")
+    recording = roadeval.Recording(tmp_path / "o.rrd")
+    return {frame: recording.truth(frame) for frame in range(FRAMES)}
+
+
+def correct(folder: Path, frames: list[int]) -> None:
+    """Export labels as a tool does: right ones of some frames, all others as proposed."""
+    if not (coco := folder / "proposals" / "instances.json").exists():
+        for proposal in (folder / "proposals").iterdir():
+            shutil.copy(proposal, folder / "labels")
+        for frame in frames:
+            levels = np.select([label_of(frame) == 3, label_of(frame) == 11], [255, 128])
+            cv2.imwrite(str(folder / "labels" / f"{stamp_of(frame):019d}.png"), levels)
+        return
+    from roadeval.logs.truth.formats.coco import as_coco
+    from roadeval.logs.truth.shapes import Proposal
+
+    right = [
+        Proposal(f"{stamp_of(f):019d}.png", label_of(f) == 3, label_of(f) == 11) for f in frames
+    ]
+    merged, other = (json.loads(as_coco(right)["instances.json"]), json.loads(coco.read_text()))
+    names = {image["file_name"] for image in merged["images"]}
+    rest = {i["id"]: i for i in other["images"] if i["file_name"] not in names}
+    for kind, kept in (
+        ("images", [*rest.values()]),
+        ("annotations", [a for a in other["annotations"] if a["image_id"] in rest]),
+    ):
+        for entry in kept:
+            keys = {"id", "image_id"} & entry.keys()
+            merged[kind].append({**entry, **{key: entry[key] + 1000 for key in keys}})
+    (folder / "labels" / "instances.json").write_text(json.dumps(merged))
+
+
+def test_the_wrong_labels_are_written_with_pictures_and_the_line_to_tell(
+    audited: tuple[Audit, Path],
+) -> None:
+    found, folder = audited
+    clear = found.suspects.query("clear").frame.tolist()
+    assert sorted(clear) == [*wrong_labels()]
+    assert found.sentences[0] == "The labels of 5 frames look wrong: 3, 7, 12, 17, 21."
+    table = json.loads((folder / "audit.json").read_text())["suspects"]
+    pictures = sorted(picture.name for picture in (folder / "suspects").iterdir())
+    assert pictures == [f"{row['rank']:02d}_frame_{row['frame']:04d}.png" for row in table]
+    images = {image.name for image in (folder / "images").iterdir()}
+    assert images == {f"{row['stamp_ns']:019d}.png" for row in table}
+
+
+def test_how_far_two_people_differ_is_told(audited: tuple[Audit, Path]) -> None:
+    said = audited[0].sentences[-1]
+    assert said.startswith("b and the truth differ on ")
+    assert said.endswith("differences of ERR below that mean nothing.")
+
+
+def test_corrected_labels_change_these_frames_and_no_others(
+    audited: tuple[Audit, Path], place: Path, tmp_path: Path
+) -> None:
+    _, folder = audited
+    correct(folder, [3, 7])
+    truth = truths(place, folder, tmp_path)
+    codes = {3: 1, 11: 255}
+    for frame in range(FRAMES):
+        label = label_of(frame, is_wrong=frame not in (3, 7))
+        expected = np.vectorize(lambda value: codes.get(value, 0))(label)
+        assert np.array_equal(truth[frame], expected), frame
+
+
+def test_an_audit_without_a_corrected_label_is_no_truth(place: Path, tmp_path: Path) -> None:
+    roadeval.audit(place / "drive.rrd", folder=tmp_path / "new")
+    config = settings().override({"truth": {"path": str(tmp_path / "new")}})
+    assert "no label in it yet" in describe(place / "drive.mcap", config).problem
+
+
+def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").touch()
+    with pytest.raises(RoadevalError, match="is not empty"):
+        roadeval.audit(place / "drive.rrd", folder=tmp_path)
+
+
+def test_an_annotator_without_masks_is_refused(place: Path) -> None:
+    with pytest.raises(RoadevalError, match="no masks of c"):
+        roadeval.audit(place / "drive.rrd", annotators=["c"])
