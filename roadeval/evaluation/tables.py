@@ -327,30 +327,24 @@ def by_class(rows: pd.DataFrame) -> pd.DataFrame:
     missed road that lies beside it; and ``worst``, frames of the first drive. Shares are means over
     drives; the greatest part of the false road comes first.
     """
-    numbers = "class " + rows["class"].astype(str)
-    names = rows["name"].astype(str)
-    names = names.where(names != "", numbers)
+    texts, pixels = rows["name"].astype(str), rows["pixels"]
     is_road, is_other = rows["truth"] == "road", rows["truth"] == "other"
-    parts = rows.assign(
-        drive=rows["drive"].astype(str),
-        name=names,
-        all=rows["pixels"],
-        pixels=rows["pixels"].where(is_road | is_other, 0),
-        of_other=rows["pixels"].where(is_other, 0),
-        false=rows["road"].where(is_other, 0),
-        missed=rows["beside"],
-        lost=(rows["pixels"] - rows["road"]).where(is_road, 0),
-    )
-    counts = ["pixels", "of_other", "road", "false", "missed", "all", "lost"]
+    names = texts.where(texts != "", "class " + rows["class"].astype(str))
+    parts = rows.astype({"drive": str, "truth": str, "worst": str}).assign(name=names, all=pixels)
+    parts["pixels"] = pixels.where(is_road | is_other, 0)
+    parts["of_other"] = pixels.where(is_other, 0)
+    parts["false"] = rows["road"].where(is_other, 0)
+    parts["lost"] = (pixels - rows["road"]).where(is_road, 0)
+    counts = ["all", "pixels", "of_other", "road", "false", "beside", "lost"]
     sums = parts.groupby(["drive", "name"], sort=False)[counts].sum()
     drives = sums.groupby("drive", sort=False).sum()
-    shares = sums.div(drives.assign(missed=drives["lost"]), level="drive")
-    by_name = shares.assign(road=sums["road"] / sums["all"]).groupby("name", sort=False)
-    means = by_name.sum() / (drives.assign(missed=drives["lost"]) > 0).sum()
-    first = parts.astype({"truth": str, "worst": str}).groupby("name", sort=False).first()
-    table = means.assign(road=by_name["road"].mean(), truth=first["truth"], worst=first["worst"])
-    table = table.sort_values(["false", "missed"], ascending=False, kind="stable")
-    return table.drop(columns=["all", "lost"])
+    drives["beside"] = drives["lost"]
+    shares = sums.div(drives, level="drive").assign(road=sums["road"] / sums["all"])
+    by_name = shares.groupby("name", sort=False)
+    table = (by_name.sum() / (drives > 0).sum()).assign(road=by_name["road"].mean())
+    table = table.join(parts.groupby("name", sort=False)[["truth", "worst"]].first())
+    table = table.rename(columns={"beside": "missed"}).drop(columns=["all", "lost"])
+    return table.sort_values(["false", "missed"], ascending=False, kind="stable")
 
 
 def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> Iterator[dict[str, Any]]:

@@ -35,12 +35,7 @@ from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.audits import without_corrections
 from roadeval.logs.truth.label_files import labels_in
-from roadeval.logs.truth.meaning import (
-    LabelSource,
-    class_names,
-    log_and_topic,
-    source_beside_log,
-)
+from roadeval.logs.truth.meaning import LabelSource, class_names, log_and_topic, source_beside_log
 from roadeval.logs.truth.named_labels import find_keys, shown_name
 from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import visible

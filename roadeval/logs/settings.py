@@ -163,8 +163,8 @@ class LabelSettings:
     names: Mapping[str, Name] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        kinds = {key.count(",") for key in self.names if _LABEL.fullmatch(key)}
-        if self.names and (len(kinds) != 1 or not all(map(_LABEL.fullmatch, self.names))):
+        kinds = {key.count(",") if _LABEL.fullmatch(key) else -1 for key in self.names}
+        if len(kinds) > 1 or -1 in kinds:
             raise SettingError("its keys must all be values, or all colours", setting="names")
         numbers = any(isinstance(label, int) for label in (*self.road, *self.ignore))
         mixed = (self.road or self.ignore) and (self.road_colors or self.ignore_colors)
@@ -196,28 +196,21 @@ class LabelSettings:
         ``names`` are further names by value, which the log tells; ``classes`` are names that stand
         in the labels themselves. A `LogError` if there are names, but a class is none of them.
         """
-        names = {**(names or {}), **self.names}
-        parts: dict[str, list[Any]] = {"road": [], "ignore": []}
-        for setting, chosen in parts.items():
+        names, chosen = {**(names or {}), **self.names}, dict[str, Any]()
+        for setting in ("road", "ignore"):
+            labels: list[Any] = []
             for label in getattr(self, setting):
-                values = [key for key, name in names.items() if name == label]
-                unknown = not values and isinstance(label, str) and not classes
-                if unknown and names:
+                keys = [key for key, name in names.items() if name == label not in classes]
+                if names and not (keys or classes) and isinstance(label, str):
                     problem = f"{label} is none of the classes of {where}"
                     remedy = f"these are {', '.join(dict.fromkeys(names.values()))}"
                     raise LogError(problem, setting=f"labels.{setting}", remedy=remedy)
-                chosen.extend([label] if label in classes or not values else values)
-        if any("," in str(label) for label in parts["road"]):
-            colors = {
-                f"{setting}_colors": tuple(tuple(map(int, label.split(","))) for label in labels)
-                for setting, labels in parts.items()
-            }
-            return replace(self, road=(), ignore=(), names=names, **colors)  # type: ignore[arg-type]
-        road, ignore = (
-            tuple(int(label) if str(label) in names else label for label in labels)
-            for labels in parts.values()
-        )
-        return replace(self, road=road, ignore=ignore, names=names)
+                labels += keys or [label]
+            colors = tuple(tuple(map(int, key.split(","))) for key in labels if "," in str(key))
+            chosen |= {f"{setting}_colors": colors} if colors else {}
+            labels = [] if colors else labels
+            chosen[setting] = tuple(int(key) if str(key) in names else key for key in labels)
+        return replace(self, names=names, **chosen)
 
 
 @dataclass(frozen=True)

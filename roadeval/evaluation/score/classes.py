@@ -71,33 +71,29 @@ class ClassSums:
         for variant, counts in by_variant.items():
             self._sums[variant] += np.column_stack([counts, counts[:, 0] > 0])
             missed = counts[:, 0] - counts[:, 1]
-            for is_missed, costs in enumerate((counts[:, 1], missed)):
+            for is_missed, costs in ((False, counts[:, 1]), (True, missed)):
                 for code in np.flatnonzero(costs[:NO_CLASS]).tolist():
-                    worst = self._worst[variant, code, bool(is_missed)]
-                    if len(worst) == SHOWN and costs[code] <= worst[-1][0]:
+                    worst, cost = self._worst[variant, code, is_missed], int(costs[code])
+                    if len(worst) == SHOWN and cost <= worst[-1][0]:
                         continue
-                    worst.append((int(costs[code]), moment))
-                    worst.sort(key=lambda frame: -frame[0])
-                    for place, (_, frame) in reversed([*enumerate(worst)]):
-                        before = (other.stamp_ns for _, other in worst[:place])
-                        is_near = any(abs(frame.stamp_ns - ns) < APART_NS for ns in before)
-                        if is_near or place >= SHOWN:
-                            del worst[place]
+                    ranked = sorted([*worst, (cost, moment)], key=lambda frame: -frame[0])
+                    worst.clear()
+                    for frame in ranked:
+                        times = [abs(frame[1].stamp_ns - at.stamp_ns) for _, at in worst]
+                        if len(worst) < SHOWN and min(times, default=APART_NS) >= APART_NS:
+                            worst.append(frame)
 
     def rows(self, classes: Sequence[TruthClass]) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of ``classes``; none if classes tell no more than the truth itself.
 
         ``classes`` are in the order of codes. More than fit into codes are no classes, but objects.
         """
-        frames = next(iter(self._sums.values()))[:, 3].tolist() if self._sums else []
-        seen = [label for label, count in zip(classes, frames, strict=False) if count]
-        kinds = Counter(label.truth for label in seen if label.truth != "ignored")
-        if max(kinds.values(), default=0) < 2 or len(classes) >= NO_CLASS:
-            return
         for variant, sums in self._sums.items():
-            for code, label in sorted(enumerate(classes), key=lambda item: item[1].value):
+            seen = [(label, code) for code, label in enumerate(classes) if sums[code, 3]]
+            kinds = Counter(label.truth for label, _ in seen if label.truth != "ignored")
+            if max(kinds.values(), default=0) < 2 or len(classes) >= NO_CLASS:
+                return
+            for label, code in sorted(seen):
                 worst = self._worst[variant, code, label.truth == "road"]
-                shown = worst if label.truth != "ignored" else []
-                numbers = " ".join(str(moment.number) for _, moment in shown)
-                if sums[code, 3]:
-                    yield variant, *label, *sums[code].tolist(), numbers
+                numbers = [str(at.number) for _, at in worst if label.truth != "ignored"]
+                yield variant, *label, *sums[code].tolist(), " ".join(numbers)

@@ -116,16 +116,13 @@ class ClassMap:
     @property
     def classes(self) -> list[TruthClass]:
         """The classes that have occurred, each at the position of its code."""
-        words = {ROAD: "road", NON_ROAD: "other", IGNORE: "ignored"}
-        colour = _color_name if self.by_color else lambda _: ""
-        return [
-            TruthClass(value, self.names.get(value) or colour(value), words[self.truth_of(value)])
-            for value in self.codes
-        ]
-
-    def truth_of(self, value: int) -> int:
-        """Return the truth of a label value or a packed colour."""
-        return self.meaning.get(value, IGNORE if value < 0 else self.others)
+        words = {ROAD: "road", NON_ROAD: "other", IGNORE: "ignored", UNKNOWN: ""}
+        classes = []
+        for value in self.codes:
+            truth = self.meaning.get(value, IGNORE if value < 0 else self.others)
+            name = self.names.get(value, _color_name(value) if self.by_color else "")
+            classes.append(TruthClass(value, name, words[truth]))
+        return classes
 
     @cached_property
     def _code_table(self) -> npt.NDArray[np.uint8]:
@@ -140,25 +137,17 @@ class ClassMap:
 
         Of more than 255 classes the last ones have no code. Any thread may call this.
         """
-        import cv2
-
         if self.others == UNKNOWN:
             return None
         values = np.maximum(labels, LEAST) if labels.dtype.kind == "i" else labels
         table = self._code_table
-
-        def look_up() -> Classes:
-            if values.dtype != np.uint8:
-                return np.asarray(table[values] - np.uint8(1))
-            return cv2.LUT(np.ascontiguousarray(values), table[:256] - np.uint8(1))
-
-        codes = look_up()
+        codes: Classes = table[values] - np.uint8(1)
         if (unseen := values[codes == NO_CLASS]).size:
             with _CODING:
                 for value in np.unique(unseen).tolist():
                     if value in self.codes or len(self.codes) < NO_CLASS:
                         table[value] = self.codes.setdefault(value, len(self.codes)) + 1
-            codes = look_up()
+            codes = table[values] - np.uint8(1)
         return codes
 
     @cached_property
@@ -441,11 +430,9 @@ def class_names(
     }
     best = [name for name, parts in near.items() if parts == max(near.values())]
     if len(best) == 1 and (near[best[0]] or best[0].count("/") <= 1):
-        reader = readers[best[0]]
-        for position in range(min(len(reader), LOOKED_AT)):
-            with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
-                classes = reader.fields(position).class_map
-                return {str(int(item.class_id)): str(item.class_name) for item in classes}
+        with suppress(FrameError, BadMessage, AttributeError, TypeError, ValueError):
+            classes = readers[best[0]].fields(0).class_map
+            return {str(int(item.class_id)): str(item.class_name) for item in classes}
     return {}
 
 

@@ -51,8 +51,8 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
             ("missed", "Share of the missed road beside it"),
         )
     ]
-    yield Figure(charts, caption("classes"))
-    frames = [[*map(int, text.split())] for text in of_focus["worst"]]
+    if len(shown):
+        yield Figure(charts, caption("classes"))
     columns: dict[str, list[Cell | str]] = {
         "class": [*of_focus.index],
         "truth": [*of_focus["truth"]],
@@ -60,7 +60,10 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
         "called road": [*map(percent, of_focus["road"])],
         "of the false road": [*map(percent, of_focus["false"].where(is_other))],
         "of the missed road": [*map(percent, of_focus["missed"].where(is_other))],
-        "worst frames": [Cell(" ".join(map(str, numbers)), frames=numbers) for numbers in frames],
+        "worst frames": [
+            Cell(text, frames=[int(word) for word in text.split() if word.isdecimal()])
+            for text in of_focus["worst"]
+        ],
     }
     if isinstance(findings, FleetFolder):
         del columns["worst frames"]

@@ -36,6 +36,12 @@ class Browser {
         this.show(Number(row.dataset.frame));
       });
     }
+    for (const link of document.querySelectorAll("a.frame")) {
+      link.addEventListener("click", (event) => {
+        event.preventDefault();
+        this.show(Number(link.textContent), { scroll: true });
+      });
+    }
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
     range.frames = this.data.frames;
     range.onChange.push(() => this.narrow());
