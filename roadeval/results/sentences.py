@@ -117,7 +117,8 @@ def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
     does, by = next((words for least, words in _TIMES.items() if times >= least), ("raises", ""))
     ends = f"{percent(base, 1)} to {percent(error, 1)} %"
     sure = sum(is_significant(change.difference) for change in changes)
-    more = f" {sure} of {len(disturbances[variant])} make it worse beyond chance."
+    makes = "makes" if sure == 1 else "make"
+    more = f" {sure} of {len(disturbances[variant])} {makes} it worse beyond chance."
     most = f"{worst.text} {does} the ERR of {variant}{by.format(times)}: {ends}."
     return f"{most}{more * bool(sure)}"
 

@@ -244,6 +244,7 @@ OTHER = {
     "frames.labelled": True,
     "frames.max_frames": 50,
     "frames.scale": 0.5,
+    "frames.disturb": ["fog:2", "exposure:-1"],
     "frames.max_pixels": 1_000_000,
     "frames.unturned": True,
     "frames.white": 4095.0,

@@ -8,15 +8,14 @@ from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison.compare import RegionChange
 from roadeval.evaluation.comparison.conditions import Condition
+from roadeval.evaluation.score.degradation import Degradation
 from roadeval.results import comparison
 from roadeval.results.comparison import (
     changed_settings,
     describe_judgement,
     headline,
 )
-from roadeval.results.sentences import (
-    notes,
-)
+from roadeval.results.sentences import describe_disturbances, notes
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 # --- Notes on a frame -----------------------------------------------------------------------------
@@ -105,3 +104,38 @@ def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told
     judgement = Condition.parse(text).judge(a_change(WORSE))
     assert describe_judgement(judgement) == f"post.filtered.ERR of new {told.format(text)}"
     assert " over 8 drives" in describe_judgement(replace(judgement, drives=8))
+
+
+# --- Disturbances ---------------------------------------------------------------------------------
+
+
+def disturbed(*ends: float, p: float | None = None) -> dict[str, Degradation]:
+    """Fog of rising strength; ``ends`` are ERR in percent, the first without a disturbance."""
+    base, *errors = ends
+    return {
+        f"fog-{strength}": Degradation(
+            *("fog", strength, error / 100, base / 100),
+            replace(a_difference(error - base, -9, 9), p_holm=p),
+        )
+        for strength, error in enumerate(errors, 1)
+    }
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        (disturbed(2.8, 5.9), "fog:1 doubles the ERR of net: 2.8 to 5.9 %."),
+        (disturbed(2, 2.2, 6), "fog:2 triples the ERR of net: 2.0 to 6.0 %."),
+        (disturbed(2, 9), "fog:1 multiplies the ERR of net by 4: 2.0 to 9.0 %."),
+        (disturbed(0, 9), "fog:1 raises the ERR of net: 0.0 to 9.0 %."),
+        (disturbed(2, 1.9), "No disturbance makes net worse."),
+        (
+            disturbed(2, 3, 3.2, p=0.001),
+            "fog:2 raises the ERR of net: 2.0 to 3.2 %. 2 of 2 make it worse beyond chance.",
+        ),
+    ],
+)
+def test_what_harms_most_is_told_in_one_sentence(changes, sentence):
+    assert describe_disturbances({"net": changes}, "net") == sentence
+    assert describe_disturbances({"net": changes}, "masks") == sentence
+    assert not describe_disturbances({}, "net")

@@ -74,11 +74,11 @@ def _table(facts: Facts | FleetFacts) -> Table:
                 ]
             )
     return Table(
-        ["variant", "disturbed by", "from, %", "to, %", "points", "interval", "better", "worse"],
+        ["variant", "disturbed by", "from", "to", TESTED, "interval", "better", "worse"],
         rows,
         text_columns=(0, 1),
         breaks=breaks[1:],
-        groups=[("", 2), ("ERR", 4), (family[0].unit, 2)],
+        groups=[("", 2), ("ERR, %", 2), ("points", 2), (family[0].unit, 2)],
         caption=correction(family),
         small=True,
     )
