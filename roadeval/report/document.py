@@ -13,7 +13,7 @@ from roadeval.data import FILTERED, UNFILTERED
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
-from roadeval.report.sections import drive, drives, frames, ground, provenance, rig, summary
+from roadeval.report.sections import drive, drives, frames, ground, provenance, rig, slices, summary
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.fleet import FleetFolder
 
@@ -21,7 +21,8 @@ ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
 Section = Callable[[Any], Iterable[Block]]
 SCORED: Final = (
-    *(drive.filter_effect, drive.regions, ground.on_the_ground, drive.stages, drive.thresholds),
+    *(drive.filter_effect, slices.when_it_fails, drive.regions, ground.on_the_ground),
+    *(drive.stages, drive.thresholds),
 )
 """The sections of a drive with truth; without truth there is one on its masks."""
 RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
@@ -31,8 +32,10 @@ RIG: Final = (rig.cameras, drive.filter_effect, rig.each_camera)
 def document(findings: Findings | FleetFolder) -> Report:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFolder):
-        parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions)
-        return _compose(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
+        parts: tuple[Section, ...] = (drives.plots, drives.strata, slices.when_it_fails)
+        return _compose(
+            findings, *parts, drive.regions, drives.missing, drives.worst, provenance.of_drives
+        )
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
     # Frames fill pages, so they come late.
@@ -56,7 +59,8 @@ def page_document(
         along = partial(drives.along, most=worst_frames, beside=folder)
         worst = partial(drives.worst, across=ACROSS, most=worst_frames)
         parts: tuple[Section, ...] = (drives.table, along, worst, drives.plots, drives.strata)
-        return _compose(findings, *parts, drive.regions, drives.missing, provenance.of_drives)
+        parts = (*parts, slices.when_it_fails, drive.regions)
+        return _compose(findings, *parts, drives.missing, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
     if browsed and browsed.film:  # which shows more

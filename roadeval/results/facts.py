@@ -25,6 +25,7 @@ from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.stats.sampling import Estimate
+from roadeval.evaluation.stats.slices import Slice
 from roadeval.evaluation.tables import final_stages
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
@@ -281,6 +282,9 @@ class Facts(FactsFile):
     """Totals with a stage replaced by the truth."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
+    slices: dict[str, list[Slice]] = field(default_factory=dict)
+    """By variant the conditions under which it errs more; a variant that is not there was not
+    searched, as with too few frames."""
     windows: int = 0
     claims: dict[str, dict[str, int]] = field(default_factory=dict)
     """Number of windows in which each claim of the paper holds."""
@@ -321,11 +325,11 @@ class Facts(FactsFile):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled", "estimate", "misfits"),
+        *("cameras", "unlabelled", "estimate", "misfits", "slices"),
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "methods", "masks", "files"),
-        *("cameras", "unlabelled", "estimate", "misfits"),
+        *("cameras", "unlabelled", "estimate", "misfits", "slices"),
     )
 
     def content(self) -> dict[str, Any]:
@@ -430,13 +434,16 @@ class FleetFacts(FactsFile):
     """The configuration of the fleet."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
+    slices: dict[str, list[Slice]] = field(default_factory=dict)
+    """As in `Facts`, over groups of drives."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
     RESULTS = (
         *("verdict", "counts", "frames", "totals", "effects", "strata", "warnings", "misfits"),
+        "slices",
     )
-    OPTIONAL = ("misfits",)
+    OPTIONAL = ("misfits", "slices")
 
 
 def is_fleet(path: str | Path) -> bool:

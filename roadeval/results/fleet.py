@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -192,14 +192,7 @@ class FleetFolder:
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
-        if name in CACHED:
-            paths = [cached_path(self.path, name, drive) for drive in chosen]
-            return read_parquet(paths, name)[[*TABLES[name].names]]
-        folders = (ResultsFolder(results_path(self.path, drive)) for drive in chosen)
-        tables = (
-            of_drive(results, name, drive) for results, drive in zip(folders, chosen, strict=True)
-        )
-        return concatenate([read_table(name, ""), *tables])
+        return table_of_drives(self.path, name, chosen)
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -299,6 +292,16 @@ def rank_worst(rows: pd.DataFrame) -> pd.DataFrame:
     return ranked.assign(rank=np.arange(1, len(ranked) + 1))
 
 
+def table_of_drives(folder: Path, name: str, drives: Sequence[str]) -> pd.DataFrame:
+    """Read a table of some scored drives, from the cache or from their results."""
+    if name in CACHED:
+        paths = [cached_path(folder, name, drive) for drive in drives]
+        return read_parquet(paths, name)[[*TABLES[name].names]]
+    folders = (ResultsFolder(results_path(folder, drive)) for drive in drives)
+    rows = (of_drive(results, name, drive) for results, drive in zip(folders, drives, strict=True))
+    return concatenate([read_table(name, ""), *rows])
+
+
 def of_drive(results: ResultsFolder, name: str, drive: str) -> pd.DataFrame:
     """Return a table of a drive's results under the drive's name in its fleet."""
     import pandas as pd
@@ -393,7 +396,8 @@ class FleetWriter:
             claim_files(*(self.folder / name for name in FILES)),
         ):
             finals, within = self._write_tables(members, asked or {})
-            facts = summarise(finals, members, settings, dict(run), within)
+            read = partial(table_of_drives, self.folder)
+            facts = summarise(finals, members, settings, dict(run), within, read=read)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.data import BASELINE
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats.difference import over_drives, strata
-from roadeval.evaluation.tables import COUNTS, MASK, group_rows, only, rates_of
+from roadeval.evaluation.stats.difference import LEAST_GROUPS, over_drives, strata
+from roadeval.evaluation.stats.slices import Slice, find_slices
+from roadeval.evaluation.tables import COUNTS, MASK, finals, group_rows, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
@@ -23,6 +25,8 @@ from roadeval.version import VERSION
 if TYPE_CHECKING:
     import pandas as pd
 
+CENTURY_NS: Final = 946_684_800_000_000_000
+"""The stamp of the year 2000."""
 WARNINGS: Final = 5
 """Number of kinds of drives' warnings that are listed."""
 
@@ -33,11 +37,14 @@ def summarise(
     settings: EvaluationSettings,
     run: dict[str, Any],
     within_one: Sequence[Effect] = (),
+    *,
+    read: Callable[[str, Sequence[str]], pd.DataFrame] | None = None,
 ) -> FleetFacts:
     """Return the facts of a fleet.
 
     ``tables`` are ``drives``, and the rows of ``scores`` and ``effects`` of final masks on all
     pixels. ``within_one`` are the differences within the drive if only one was scored.
+    ``read`` reads a table of some drives, in which slices are searched.
     """
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
@@ -75,8 +82,47 @@ def summarise(
         warnings=[*_warnings_of_copies(copies, cameras), *_warnings_of_drives(rows)],
         run=run,
         misfits=[*_misfits(rows)],
+        slices={} if read is None else _slices(read, drives, groups, settings.confidence),
     )
     return replace(facts, verdict=verdict_on(facts))
+
+
+def _slices(
+    read: Callable[[str, Sequence[str]], pd.DataFrame],
+    drives: pd.DataFrame,
+    groups: Mapping[str, str],
+    confidence: float,
+) -> dict[str, list[Slice]]:
+    """Return the slices of each final mask; nothing with too few groups of drives.
+
+    Every drive counts the same. Beside measured quantities there are tags and times: in the drive,
+    and of the day if the stamps are of this century.
+    """
+    scored = drives["drive"][drives["evaluated"].fillna(0) > 0].tolist()
+    if len({groups[drive] for drive in scored}) < 2 * LEAST_GROUPS:
+        return {}
+    conditions, frames, parts = (read(name, scored) for name in ("conditions", "frames", "regions"))
+    if not len(conditions):  # made before they were measured
+        return {}
+    stamps = conditions["stamp_ns"]
+    starts = stamps.groupby(conditions["drive"], observed=True).transform("min")
+    hours = stamps / 3.6e12 % 24
+    conditions = conditions.assign(
+        seconds=(stamps - starts) / 1e9,
+        hour=hours.where((stamps > CENTURY_NS) & (stamps < 4 * CENTURY_NS)),
+        group=conditions["drive"].map(groups).astype("str"),
+    ).astype({"drive": "str"})
+    tags = [name for name in map(str, drives) if name.startswith(TAG)]
+    conditions = conditions.merge(drives[["drive", *tags]].astype({"drive": "str"}), on="drive")
+    parts = parts.assign(wrong=parts["FP"] + parts["FN"])
+    parts = parts[parts["region"].astype("str").str.match(r"band_|\d")]
+    return {
+        variant: find_slices(
+            rows, conditions, only(parts, variant=variant), confidence, over_drives=True
+        )
+        for (variant,), rows in group_rows(finals(frames), ["variant"])
+        if variant != BASELINE
+    }
 
 
 def _totals(scores: pd.DataFrame) -> Totals:

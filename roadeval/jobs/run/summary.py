@@ -244,6 +244,7 @@ def join_cameras(
         beyond={},
         curves={},
         thresholds={},
+        slices={},
         oracles={},
         seconds={},
         examples=[],
