@@ -22,6 +22,7 @@ from roadeval.report.sections import (
     ground,
     provenance,
     rig,
+    slices,
     summary,
 )
 from roadeval.report.sections.frames import FrameBrowser
@@ -30,7 +31,7 @@ from roadeval.results.fleet import FleetFolder
 ACROSS: Final = 6
 """Worst frames of a fleet beside each other on a page."""
 Section = Callable[[Any], Iterable[Block]]
-WHY: Final = (classes.section, disturbances.section)
+WHY: Final = (classes.section, slices.when_it_fails, disturbances.section)
 """The sections on what goes wrong, of a drive or of many."""
 SCORED: Final = (
     *(drive.filter_effect, drive.regions, *WHY, ground.on_the_ground),

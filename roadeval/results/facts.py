@@ -26,6 +26,7 @@ from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.stats.sampling import Estimate
+from roadeval.evaluation.stats.slices import Slice
 from roadeval.evaluation.tables import final_stages
 from roadeval.geometry.ground import Ground
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
@@ -287,6 +288,9 @@ class Facts(FactsFile):
     """What is confirmed about the errors of each variant, see `roadeval.results.why.explain`."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
+    slices: dict[str, list[Slice]] = field(default_factory=dict)
+    """By variant the conditions under which it errs more; a variant that is not there was not
+    searched, as with too few frames."""
     windows: int = 0
     claims: dict[str, dict[str, int]] = field(default_factory=dict)
     """Number of windows in which each claim of the paper holds."""
@@ -327,11 +331,11 @@ class Facts(FactsFile):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "why"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why"),
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "methods", "masks", "files"),
-        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "why"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why"),
     )
 
     def content(self) -> dict[str, Any]:
@@ -440,15 +444,18 @@ class FleetFacts(FactsFile):
     """ERR of final masks on disturbed frames, over drives."""
     why: dict[str, list[str]] = field(default_factory=dict)
     """As of a drive."""
+    slices: dict[str, list[Slice]] = field(default_factory=dict)
+    """As in `Facts`, over groups of drives."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
     RESULTS = (
         *("verdict", "counts", "frames", "totals", "effects", "strata", "warnings", "misfits"),
         "disturbances",
+        "slices",
         "why",
     )
-    OPTIONAL = ("misfits", "disturbances", "why")
+    OPTIONAL = ("misfits", "disturbances", "slices", "why")
 
 
 def is_fleet(path: str | Path) -> bool:

@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -194,15 +194,7 @@ class FleetFolder:
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
-        if name in CACHED:
-            paths = [cached_path(self.path, name, drive) for drive in chosen]
-            paths = [path for path in paths if name != "classes" or path.is_file()]
-            return read_parquet(paths, name)[[*TABLES[name].names]]
-        folders = (ResultsFolder(results_path(self.path, drive)) for drive in chosen)
-        tables = (
-            of_drive(results, name, drive) for results, drive in zip(folders, chosen, strict=True)
-        )
-        return concatenate([read_table(name, ""), *tables])
+        return table_of_drives(self.path, name, chosen)
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -302,6 +294,17 @@ def rank_worst(rows: pd.DataFrame) -> pd.DataFrame:
     return ranked.assign(rank=np.arange(1, len(ranked) + 1))
 
 
+def table_of_drives(folder: Path, name: str, drives: Sequence[str]) -> pd.DataFrame:
+    """Read a table of some scored drives, from the cache or from their results."""
+    if name in CACHED:
+        paths = [cached_path(folder, name, drive) for drive in drives]
+        paths = [path for path in paths if name != "classes" or path.is_file()]
+        return read_parquet(paths, name)[[*TABLES[name].names]]
+    folders = (ResultsFolder(results_path(folder, drive)) for drive in drives)
+    rows = (of_drive(results, name, drive) for results, drive in zip(folders, drives, strict=True))
+    return concatenate([read_table(name, ""), *rows])
+
+
 def of_drive(results: ResultsFolder, name: str, drive: str) -> pd.DataFrame:
     """Return a table of a drive's results under the drive's name in its fleet."""
     import pandas as pd
@@ -397,7 +400,9 @@ class FleetWriter:
             claim_files(*(self.folder / name for name in FILES)),
         ):
             finals, within, disturbed = self._write_tables(members, asked or {})
-            facts = summarise(finals, members, settings, dict(run), within, disturbances=disturbed)
+            read = partial(table_of_drives, self.folder)
+            given = finals, members, settings, dict(run), within
+            facts = summarise(*given, disturbances=disturbed, read=read)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.data import BASELINE
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
 from roadeval.evaluation.score.degradation import Degradations, as_corrected
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats.difference import over_drives, strata
-from roadeval.evaluation.tables import COUNTS, MASK, group_rows, only, rates_of
+from roadeval.evaluation.stats.difference import LEAST_GROUPS, over_drives, strata
+from roadeval.evaluation.stats.slices import Slice, find_slices
+from roadeval.evaluation.tables import COUNTS, MASK, finals, group_rows, only, rates_of
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
 from roadeval.results.verdict import verdict_on
+from roadeval.results.why import explain
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
     import pandas as pd
 
+CENTURY_NS: Final = 946_684_800_000_000_000
+"""The stamp of the year 2000."""
 WARNINGS: Final = 5
 """Number of kinds of drives' warnings that are listed."""
 
@@ -36,12 +41,14 @@ def summarise(
     within_one: Sequence[Effect] = (),
     *,
     disturbances: Mapping[str, Degradations] | None = None,
+    read: Callable[[str, Sequence[str]], pd.DataFrame] | None = None,
 ) -> FleetFacts:
     """Return the facts of a fleet.
 
     ``tables`` are ``drives``, and the rows of ``scores`` and ``effects`` of final masks on all
     pixels. ``within_one`` are the differences within the drive if only one was scored;
-    ``disturbances`` those of each drive.
+    ``disturbances`` those of each drive. ``read`` reads a table of some drives, in which slices are
+    searched.
     """
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
@@ -80,8 +87,11 @@ def summarise(
         run=run,
         misfits=[*_misfits(rows)],
         disturbances=_degradations(disturbances or {}, groups, settings.confidence),
+        slices={} if read is None else _slices(read, drives, groups, settings.confidence),
     )
-    return replace(facts, verdict=verdict_on(facts))
+    scored = [row["drive"] for row in rows if row["evaluated"]]
+    why = {} if read is None else explain(facts, read("classes", scored))
+    return replace(facts, verdict=verdict_on(facts), why=why)
 
 
 def _degradations(
@@ -110,6 +120,44 @@ def _degradations(
         )
         means[names] = replace(changes.iloc[0], ERR=error, base_ERR=base, difference=over)
     return as_corrected(means)
+
+
+def _slices(
+    read: Callable[[str, Sequence[str]], pd.DataFrame],
+    drives: pd.DataFrame,
+    groups: Mapping[str, str],
+    confidence: float,
+) -> dict[str, list[Slice]]:
+    """Return the slices of each final mask; nothing with too few groups of drives.
+
+    Every drive counts the same. Beside measured quantities there are tags and times: in the drive,
+    and of the day if the stamps are of this century.
+    """
+    scored = drives["drive"][drives["evaluated"].fillna(0) > 0].tolist()
+    if len({groups[drive] for drive in scored}) < 2 * LEAST_GROUPS:
+        return {}
+    conditions, frames, parts = (read(name, scored) for name in ("conditions", "frames", "regions"))
+    if not len(conditions):  # made before they were measured
+        return {}
+    stamps = conditions["stamp_ns"]
+    starts = stamps.groupby(conditions["drive"], observed=True).transform("min")
+    hours = stamps / 3.6e12 % 24
+    conditions = conditions.assign(
+        seconds=(stamps - starts) / 1e9,
+        hour=hours.where((stamps > CENTURY_NS) & (stamps < 4 * CENTURY_NS)),
+        group=conditions["drive"].map(groups).astype("str"),
+    ).astype({"drive": "str"})
+    tags = [name for name in map(str, drives) if name.startswith(TAG)]
+    conditions = conditions.merge(drives[["drive", *tags]].astype({"drive": "str"}), on="drive")
+    parts = parts.assign(wrong=parts["FP"] + parts["FN"])
+    parts = parts[parts["region"].astype("str").str.match(r"band_|\d")]
+    return {
+        variant: find_slices(
+            rows, conditions, only(parts, variant=variant), confidence, over_drives=True
+        )
+        for (variant,), rows in group_rows(finals(frames), ["variant"])
+        if variant != BASELINE
+    }
 
 
 def _totals(scores: pd.DataFrame) -> Totals:

@@ -53,6 +53,12 @@ def doubt_rows(frame: Frame, doubts: Iterable[Doubt]) -> dict[str, list[Row]]:
     return {"unlabelled": rows}
 
 
+def condition_rows(result: FrameResult, values: Sequence[float]) -> dict[str, list[Row]]:
+    """Return the row of ``conditions`` of an evaluated frame; none of another."""
+    when = result.frame.number, result.frame.stamp_ns
+    return {"conditions": [(*when, *values)] if result.tallies else []}
+
+
 def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
     """Return the rows of an evaluated frame by table; no rows for other frames."""
     frame, tallies = result.frame, result.tallies

@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.score.conditions import QUANTITIES
 from roadeval.evaluation.score.unlabelled import SIGNS
 
 if TYPE_CHECKING:
@@ -128,6 +129,7 @@ _RATES: Final = {
     for name, metric in METRICS.items()
 }
 _DOUBTS: Final = tuple(Column(sign, Kind.RATE, words) for sign, words in SIGNS.items())
+_QUANTITIES: Final = tuple(Column(name, Kind.NUMBER, doc) for name, doc in QUANTITIES.items())
 _MEANS: Final = (
     *(Column(name, Kind.RATE, f"mean of the frames' {name}") for name in METRICS),
     *(Column(f"pooled_{name}", Kind.RATE, f"{name} of the summed counts") for name in METRICS),
@@ -180,6 +182,7 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         _LABELLED,
     ),
     "unlabelled": (*_IN_FRAME, _STAMP, *_MASK, *_DOUBTS),
+    "conditions": (*_IN_FRAME, _STAMP, *_QUANTITIES),
     "edges": (
         *_IN_FRAME,
         *_MASK,
@@ -344,6 +347,7 @@ _ROWS: Final = {
     "disturbances": "A row per evaluated frame, disturbance and variant: its final mask then.",
     "disagreements": "A row per evaluated frame and pair of final masks.",
     "unlabelled": "A row per frame without truth and variant: how doubtful its mask is.",
+    "conditions": "A row per evaluated frame: what its image and its truth are like.",
     "edges": "A row per evaluated frame, final mask and place where the road ends, in metres.",
     "windows": "A row per window of consecutive evaluated frames, variant and stage.",
     "changes": "A row per mask and the one before: stage to stage, final mask to final mask.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,8 +13,10 @@ from roadeval.evaluation.score.degradation import Degradations
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
+from roadeval.evaluation.stats.slices import Condition, Slice
 from roadeval.evaluation.tables import by_class, only
 from roadeval.results.facts import FrameAccount
+from roadeval.results.schema import TAG
 from roadeval.runtime.sentence import Sentence
 
 if TYPE_CHECKING:
@@ -202,6 +205,72 @@ def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
             parts += [f"{percent(part, 0)} % {beside}{n}" for n, part in others if part >= 0.1]
             sentences[kind] = f"{', '.join(parts)}{over}."
     return sentences
+
+
+_QUANTITIES: Final = {
+    "brightness": ("with a brightness {} {} %", "below", "above"),
+    "contrast": ("with a contrast {} {} %", "below", "above"),
+    "shadow": ("with {} {} % shade", "less than", "more than"),
+    "blur": ("with a blur {} {} %", "below", "above"),
+    "change": ("that differ by {} {} % from the frame before", "less than", "more than"),
+    "road_share": ("with {} {} % road", "less than", "more than"),
+    "curvature": ("with a road bent by {} {} % of the width", "less than", "more than"),
+    "seconds": ("{} {} s of the drive", "in the first", "after"),
+    "hour": ("{} {} UTC", "before", "after"),
+}
+"""Words behind "frames" for each quantity, and those for below and above its limit."""
+
+
+def describe_condition(condition: Condition) -> str:
+    """Return a condition as words behind "frames".
+
+    >>> describe_condition(Condition("shadow", ">", 0.3))
+    'with more than 30 % shade'
+    >>> describe_condition(Condition("hour", "<", 17.5))
+    'before 17:30 UTC'
+    """
+    name, limit = condition.quantity, condition.limit
+    if isinstance(limit, str):
+        return f"with {name.removeprefix(TAG)} {limit}"
+    words, below, above = _QUANTITIES.get(name, (f"with {name} {{}} {{}}", "below", "above"))
+    text = f"{100 * limit if '%' in words else limit:g}"
+    if name == "hour":
+        text = f"{int(limit):02d}:{round(limit % 1 * 60):02d}"
+    return words.format(below if condition.operator == "<" else above, text)
+
+
+def describe_part(part: str) -> str:
+    """Return where a part of the image lies.
+
+    >>> describe_part("20-80m"), describe_part("rows_40-60"), describe_part("left")
+    ('20 to 80 m ahead', '40 to 60 % down the image', 'in the left half of the image')
+    """
+    if match := re.fullmatch(r"(\d+)-(\d+)m", part):
+        return f"{match[1]} to {match[2]} m ahead"
+    if match := re.fullmatch(r"rows_(\d+)-(\d+)", part):
+        return f"{match[1]} to {match[2]} % down the image"
+    return f"in the {part} half of the image" if part in ("left", "right") else f"on {part}"
+
+
+def describe_slice(found: Slice) -> str:
+    """Return where ERR is higher, and by how much, as a sentence.
+
+    >>> shade = Condition("shadow", ">", 0.3)
+    >>> describe_slice(Slice([shade], "20-80m", 90, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01))
+    'In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest (1.8 to 4.9).'
+    """
+    words = describe_place(found)
+    return (
+        f"{words[0].upper()}{words[1:]}, ERR is {found.ratio:.1f} times the rest "
+        f"({found.low:.1f} to {found.high:.1f})."
+    )
+
+
+def describe_place(found: Slice) -> str:
+    """Return which frames, and which part of them, a slice is."""
+    conditions = " and ".join(map(describe_condition, found.conditions))
+    parts = [f"in frames {conditions}" * bool(conditions), found.part and describe_part(found.part)]
+    return ", ".join(filter(None, parts))
 
 
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:

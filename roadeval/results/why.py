@@ -12,6 +12,7 @@ from roadeval.results.facts import Facts, FleetFacts
 from roadeval.results.sentences import (
     describe_classes,
     describe_disturbances,
+    describe_slice,
     is_significant,
 )
 
@@ -41,6 +42,9 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
         shares = by_class(rows).sort_values(kind, ascending=False, kind="stable")
         numbers = shares["worst"].iloc[0].split() if isinstance(facts, Facts) else []
         yield with_frames(sentence, numbers)
+    for confirmed in facts.slices.get(variant, [])[:1]:
+        numbers = [] if confirmed.drives else [*map(str, confirmed.worst)]
+        yield with_frames(describe_slice(confirmed), numbers)
     changes = facts.disturbances.get(variant, {})
     if any(is_significant(change.difference) for change in changes.values()):
         yield describe_disturbances({variant: changes}, variant)

@@ -1,8 +1,9 @@
 """Lines of tables, and facts, as a replay writes them."""
 
 from roadeval.data import TruthClass
+from roadeval.evaluation.score.conditions import QUANTITIES
 from roadeval.results.facts import DriveFacts, Facts, FrameAccount
-from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
+from roadeval.results.rows import Key, condition_rows, csv_lines, frame_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.tables import read_table
 
@@ -10,7 +11,8 @@ KEY = Key("street", "/camera/image")
 
 
 def lines(result):
-    return csv_lines(KEY, frame_rows(result))
+    conditions = condition_rows(result, [0.5] * len(QUANTITIES))
+    return csv_lines(KEY, frame_rows(result) | conditions)
 
 
 CLASSES = [

@@ -40,6 +40,7 @@ from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.score.classes import ClassSums
+from roadeval.evaluation.score.conditions import FrameConditions
 from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
 from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
@@ -48,6 +49,7 @@ from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.settings import DEGRADED_ERR, EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, holm, within_drive
+from roadeval.evaluation.stats.slices import LEAST_FRAMES, Slice, find_slices
 from roadeval.evaluation.tables import KEY, final_stages, masks_of, only, pair_rows, rates_of
 from roadeval.geometry.ground import Ground
 
@@ -254,6 +256,7 @@ class Scoreboard:
         """The frames without truth."""
         self.apart: dict[int, Mapping[str, float]] = {}
         """ERR of the frames that were picked by rank, by number and variant."""
+        self.conditions = FrameConditions()
         self._training = Curves()
         self._edges = EdgesAndFlicker(settings.boundary_width)
         self._seconds = defaultdict[Name, list[float]](lambda: [0.0, 0])
@@ -269,6 +272,7 @@ class Scoreboard:
         Returned are the doubts on a frame without truth.
         """
         doubts = self.unlabelled.add(result)
+        self.conditions.add(result)
         self._roles[result.role] += 1
         if result.apart:
             self.apart[result.frame.number] = result.apart
@@ -306,6 +310,7 @@ class Scoreboard:
         """Note that a frame was read here and could not be decoded."""
         self._edges.interrupt()
         self.unlabelled.interrupt()
+        self.conditions.interrupt()
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
@@ -359,8 +364,21 @@ class Scoreboard:
             "claims": evidence(windows, settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
+            "slices": self._slices(frames),
         }
         return DriveSums(frames, windows, drive_effects(frames, settings), parts, disturbed)
+
+    def _slices(self, frames: pd.DataFrame) -> dict[str, list[Slice]]:
+        """Return the slices of each final mask; nothing if there are too few frames."""
+        key, confidence = dict(zip(KEY, self._key, strict=True)), self._settings.confidence
+        conditions = self.conditions.table().assign(**key)
+        return {
+            variant: find_slices(
+                rows, conditions, self.conditions.parts(variant).assign(**key), confidence
+            )
+            for (variant,), rows in tables.group_rows(tables.finals(frames), ["variant"])
+            if variant != BASELINE and len(rows) >= LEAST_FRAMES
+        }
 
 
 @dataclass(frozen=True, eq=False)

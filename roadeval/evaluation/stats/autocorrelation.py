@@ -37,6 +37,10 @@ _TAIL: Final = 0.025
 """Student's distribution and the mixture have the same tails of this probability."""
 
 
+_SHARES: Final = (1, 0.95, 0.75, 0.5, 0.25)
+"""The autoregression's shares of the variance that are tried."""
+
+
 class MeanDistribution(NamedTuple):
     """Student's distribution of a mean, skewed, given a series.
 
@@ -73,20 +77,27 @@ class MeanDistribution(NamedTuple):
         return self.mean - self.standard_error * ends[0], self.mean - self.standard_error * ends[1]
 
 
-def mean_distribution(series: Floats, *, independent: bool = False) -> MeanDistribution:
+def mean_distribution(
+    series: Floats, *, independent: bool = False, factors: Floats | None = None
+) -> MeanDistribution:
     """Estimate the mean of a stationary process from a stretch of it, ``(n,)``, n at least 4.
 
-    For values that are ``independent`` by design it is Student's distribution of textbooks.
+    For values that are ``independent`` by design it is Student's distribution of textbooks. With
+    ``factors``, ``(n,)``, it is the sum of values times factors, as the difference of two parts'
+    means: the more slowly they change, the more of the slow errors it has.
     """
     from scipy.fft import dct
     from scipy.special import beta, stdtr, stdtridf, stdtrit
 
-    n, mean = len(series), float(series.mean())
+    n = len(series)
+    mean = float(series.mean() if factors is None else factors @ series)
     if np.ptp(series) == 0:
         return MeanDistribution(mean, 0.0, n - 1, n)
     if independent:
         return MeanDistribution(mean, float(series.std(ddof=1)) / math.sqrt(n), n - 1, n)
     precisions, log_factor, of_mean = _models(n)
+    if factors is not None:
+        of_mean = _variances_of_sum(factors)
     count = precisions.shape[1]
     variances = precisions @ dct(series, norm="ortho")[1 : count + 1] ** 2 / count
     fit = log_factor - count / 2 * np.log(variances)
@@ -105,6 +116,8 @@ def mean_distribution(series: Floats, *, independent: bool = False) -> MeanDistr
         half += step
     degrees = float(stdtridf(_TAIL, -half / error))
     effective = min(float(series.var()) / error**2, n)
+    if factors is not None:
+        return MeanDistribution(mean, error, degrees, effective)
     centred = series - mean
     skewness = float((centred**3).mean() / (centred**2).mean() ** 1.5)
     # Only as far as it exceeds its standard error, which is that of independent normal values.
@@ -122,14 +135,30 @@ def _models(n: int) -> tuple[Floats, Floats, Floats]:
     """
     # Coefficients from 0 to a memory of ten lengths, closer together near 1, where they matter
     # most. All are equally likely: their weights are proportional to their distance from 1.
-    distance = (10.0 * n) ** -np.linspace(0, 1, 48)
+    distance = _distances(n)
     # The autoregression's shares of the variance: the whole is as likely as all others together.
-    shares, likely = np.array([(1, 0.5), (0.95, 0.06), (0.75, 0.12), (0.5, 0.12), (0.25, 0.2)]).T
+    likely = np.array([0.5, 0.06, 0.12, 0.12, 0.2])
     count = min(max(90, round(2.5 * math.sqrt(n))), n - 1)
     slow = cosine_variances(1 - distance, count + 1, n)
-    of_mean, *variances = np.concatenate([share * slow + (1 - share) for share in shares]).T
+    of_mean, *variances = np.concatenate([share * slow + (1 - share) for share in _SHARES]).T
     prior = np.log(np.outer(likely, distance).ravel())
     return 1 / np.transpose(variances), prior - np.log(variances).sum(axis=0) / 2, of_mean / n
+
+
+def _distances(n: int) -> Floats:
+    """Return the coefficients that are tried, as their distances from 1."""
+    distances: Floats = (10.0 * n) ** -np.linspace(0, 1, 48)
+    return distances
+
+
+def _variances_of_sum(factors: Floats) -> Floats:
+    """Return the variance of the sum of values times factors in each model, for variance 1."""
+    n = len(factors)
+    spectrum = np.fft.rfft(factors, 2 * n)
+    products = np.fft.irfft(np.abs(spectrum) ** 2)[:n]
+    powers = (1 - _distances(n))[:, None] ** np.arange(1, n)
+    slow, white = products[0] + 2 * powers @ products[1:], products[0]
+    return np.concatenate([share * slow + (1 - share) * white for share in _SHARES])
 
 
 def cosine_variances(coefficients: Floats, count: int, n: int) -> Floats:

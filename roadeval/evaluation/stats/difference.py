@@ -153,6 +153,13 @@ def interval(
     )
 
 
+def p_value(values: Floats, unit: Literal["frames", "drives"]) -> float:
+    """Return the two-sided p-value of a mean of 0, as `interval` computes it."""
+    if unit == "drives" and len(values) < STUDENT_FROM:
+        return sign_flip_p(values)
+    return mean_distribution(values, independent=unit == "drives").p_value()
+
+
 def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
     """Average the differences of a rate over a drive's frames, with an interval.
 

@@ -38,7 +38,7 @@ from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
 from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME, Layout
 from roadeval.results.facts import focus_of
-from roadeval.results.rows import Key, csv_lines, doubt_rows, frame_rows
+from roadeval.results.rows import Key, condition_rows, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime.files import sha256_of
@@ -178,7 +178,8 @@ class Run:
             self.failures.first = None
         for failure in done.failures:
             self.failures.add(failure)
-        lines = csv_lines(self.key, doubt_rows(done.result.frame, doubts))
+        rows = doubt_rows(done.result.frame, doubts)
+        lines = csv_lines(self.key, rows | condition_rows(done.result, self.board.conditions.last))
         return replace(done, lines={**done.lines, **lines})
 
     def layout(self) -> Layout:

@@ -249,6 +249,7 @@ def join_cameras(
         beyond={},
         curves={},
         thresholds={},
+        slices={},
         oracles={},
         disturbances=degradations(disturbed, frames, first.evaluation),
         why={},

@@ -8,6 +8,7 @@ from roadeval.data.words import short_names
 from roadeval.report.blocks import Block, Details, Heading, KeepTogether, Text
 from roadeval.report.findings import Findings
 from roadeval.report.sections.frames import notable_frame
+from roadeval.report.sections.slices import when_it_fails
 from roadeval.report.tables import cameras_table, rates_table
 
 
@@ -29,5 +30,6 @@ def each_camera(findings: Findings) -> Iterator[Block]:
         yield Text(facts.verdict)
         if of_camera.totals:
             yield Details("Rates of every final mask", [rates_table(facts)])
+        yield from when_it_fails(of_camera, level=2)
         for frame in of_camera.worst[:1]:
             yield KeepTogether([*notable_frame(of_camera, frame)])

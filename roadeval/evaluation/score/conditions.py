@@ -1,0 +1,155 @@
+"""Conditions of frames: light, sharpness, movement, and how the road lies. Cheap, without masks.
+
+They are measured on the image and its truth, so that slices of frames with more errors can be named
+in words (`roadeval.evaluation.stats.slices`).
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from roadeval.data import ROAD, FrameResult, Rgb, Truth
+from roadeval.data.arrays import FP, IGNORED, Plane
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+QUANTITIES: Final[Mapping[str, str]] = {
+    "brightness": "mean luminance, from 0 to 1",
+    "contrast": "standard deviation of the luminance, at a width of 64 pixels",
+    "shadow": "detected shadow's share of the labelled pixels; empty without a filter",
+    "blur": "1 minus the mean difference of neighbours in a row, relative to that of pixels four "
+    "apart: 0 is sharp, 0.75 is smooth",
+    "change": "mean difference of luminance from the frame before, at a width of 64 pixels; empty "
+    "for the first",
+    "road_share": "road's share of the labelled pixels of the truth",
+    "curvature": "distance of the true road's middle from the straight line between its far and "
+    "its near third, in the third between, relative to the image's width",
+}
+"""The measured quantities with their meanings."""
+ACROSS: Final = 64
+LINES: Final = 32
+"""Rows of a frame that are looked at for blur and curvature, about as many."""
+LEAST_ROWS: Final = 6
+FAR: Final = 4
+DIGITS: Final = 5
+
+
+def shrink(image: Rgb) -> Plane:
+    """Return an image's luminance, ``(h, 64)`` uint8."""
+    import cv2
+
+    height, width, _ = image.shape
+    small = cv2.resize(
+        image, (ACROSS, max(height * ACROSS // width, 1)), interpolation=cv2.INTER_AREA
+    )
+    grey: Plane = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
+    return grey
+
+
+def blur(image: Rgb) -> float:
+    """Return how smooth an image is along some of its rows; NaN if it has one colour."""
+    rows = image[:: max(len(image) // LINES, 1), :, 1].astype(np.int16)
+    if rows.shape[1] <= FAR:
+        return math.nan
+    near, far = (float(np.abs(rows[:, k:] - rows[:, :-k]).mean()) for k in (1, FAR))
+    return 1 - near / far if far else math.nan
+
+
+def curvature(truth: Truth) -> float:
+    """Return how bent the road is, see `QUANTITIES`; NaN if it is seen in few rows."""
+    road = truth[:: max(len(truth) // LINES, 1)] == ROAD
+    sizes = road.sum(axis=1)
+    there = sizes > 0
+    if there.sum() < LEAST_ROWS:
+        return math.nan
+    middles = (road[there] @ np.arange(road.shape[1])) / sizes[there]
+    far, between, near = (part.mean() for part in np.array_split(middles, 3))
+    return float(abs(between - (far + near) / 2)) / road.shape[1]
+
+
+def parts_of(result: FrameResult) -> Iterator[tuple[str, str, int, int]]:
+    """Yield variant and name of each part of a frame's pixels, how many are wrong, and how many.
+
+    Parts are image rows, distances and sides; they are of final masks.
+    """
+    for tally in {tally.variant: tally for tally in result.tallies}.values():
+        for name, counts in tally.regions.items():
+            if name.startswith("band_") or name[0].isdigit():
+                yield tally.variant, name, counts.fp + counts.fn, counts.n
+    for variant, errors in result.errors.items():
+        halves = np.array_split(errors.array.astype(np.uint8, copy=False), 2, axis=1)
+        for name, half in zip(("left", "right"), halves, strict=True):
+            wrong, ignored = ((half & bits == code).sum() for bits, code in ((6, FP), (4, IGNORED)))
+            yield variant, name, int(wrong), int(half.size - ignored)
+
+
+class FrameConditions:
+    """Collects the conditions of a drive's evaluated frames, and the counts of their parts."""
+
+    def __init__(self) -> None:
+        self._moments, self._values = array("q"), array("d")
+        self._parts: defaultdict[tuple[str, str], array[int]] = defaultdict(lambda: array("q"))
+        self._before: Plane | None = None
+
+    def add(self, result: FrameResult) -> None:
+        """Add a frame, in the drive's order."""
+        image, truth = result.frame.image, result.frame.truth
+        before, now = self._before, shrink(image)
+        self._before = now
+        if not result.tallies or truth is None:
+            return
+        counts = result.tallies[-1].counts
+        shade = next((t.regions["shadow"].n for t in result.tallies if "shadow" in t.regions), None)
+        change = math.nan
+        if before is not None and before.shape == now.shape:
+            change = float(np.abs(now.astype(np.int16) - before).mean()) / 255
+        values = {
+            "brightness": float(now.mean()) / 255,
+            "contrast": float(now.std()) / 255,
+            "shadow": shade / counts.n if shade is not None and counts.n else math.nan,
+            "blur": blur(image),
+            "change": change,
+            "road_share": (counts.tp + counts.fn) / counts.n if counts.n else math.nan,
+            "curvature": curvature(truth),
+        }
+        self._moments.extend((result.frame.number, result.frame.stamp_ns))
+        self._values.extend(round(values[name], DIGITS) for name in QUANTITIES)
+        for variant, name, wrong, pixels in parts_of(result):
+            self._parts[variant, name].extend((result.frame.number, wrong, pixels))
+
+    def interrupt(self) -> None:
+        """Note that the next frame does not follow the one before."""
+        self._before = None
+
+    @property
+    def last(self) -> list[float]:
+        """The values of the last evaluated frame, in the order of `QUANTITIES`."""
+        return self._values[-len(QUANTITIES) :].tolist()
+
+    def table(self) -> pd.DataFrame:
+        """Return the rows of ``conditions``, without the key."""
+        import pandas as pd
+
+        moments = np.array(self._moments, np.int64).reshape(-1, 2)
+        table = pd.DataFrame(moments, columns=["frame", "stamp_ns"])
+        table[[*QUANTITIES]] = np.array(self._values).reshape(-1, len(QUANTITIES))
+        return table
+
+    def parts(self, variant: str) -> pd.DataFrame:
+        """Return for each part of each frame the wrong and all labelled pixels of a final mask."""
+        import pandas as pd
+
+        columns = ["frame", "wrong", "N"]
+        tables = [
+            pd.DataFrame(np.reshape(rows, (-1, 3)), columns=columns).assign(region=name)
+            for (of, name), rows in self._parts.items()
+            if of == variant
+        ]
+        return pd.concat(tables) if tables else pd.DataFrame(columns=[*columns, "region"])

@@ -1,0 +1,55 @@
+"""When a mask fails: the conditions under which it errs more, found and then confirmed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from roadeval.data.words import number, percent
+from roadeval.evaluation.stats.difference import LEAST_GROUPS
+from roadeval.evaluation.stats.slices import LEAST_FRAMES
+from roadeval.report.blocks import Block, Heading, LinkList, Table, Text
+from roadeval.report.captions import caption, note
+from roadeval.report.findings import Findings
+from roadeval.results.fleet import FleetFolder
+from roadeval.results.schema import DAMAGED, SCORED
+from roadeval.results.sentences import describe_place, describe_slice
+
+
+def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[Block]:
+    """Yield the slices of the focus, or that none holds; nothing if no search was made.
+
+    The heading is of a ``level``; only a page of one camera has the frames that are linked.
+    """
+    facts, of_fleet = findings.facts, isinstance(findings, FleetFolder)
+    slices = facts.slices.get(facts.focus or "")
+    if isinstance(findings, FleetFolder):
+        scored = sum(findings.facts.counts.get(status, 0) for status in (SCORED, DAMAGED))
+        names, unit, few = findings.names, "drives", scored < 2 * LEAST_GROUPS
+    else:
+        names, unit, few = {}, "drive", findings.facts.frames.evaluated < LEAST_FRAMES
+    if facts.focus is None or (slices is None and not few):
+        return
+    yield Heading("When it fails", level)
+    if not slices:
+        least = f"{2 * LEAST_GROUPS} drives" if of_fleet else f"{LEAST_FRAMES} frames"
+        name = "no slices" if slices is not None else "too little for slices"
+        yield Text(caption(name, variant=facts.focus, unit=unit, least=least))
+        return
+    rows, links = [], dict[str, str]()
+    for found in slices:
+        yield Text(describe_slice(found))
+        frames = [str(frame) for frame in found.worst]
+        if found.drives:
+            pairs = zip(found.drives, frames, strict=True)
+            frames = [f"{names.get(drive, drive)} {frame}" for drive, frame in pairs]
+        elif level == 1:
+            links |= {f"Frame {frame}": f"#frame-{frame}" for frame in frames}
+        ratio = f"{found.ratio:.2f} ({found.low:.2f} to {found.high:.2f})"
+        rates = percent(found.inside), percent(found.outside)
+        place = describe_place(found)
+        rows.append([place, number(found.frames), *rates, ratio, ", ".join(frames)])
+    columns = ["where", "frames", "ERR, %", "elsewhere, %", "ratio", "worst frames"]
+    yield Table(columns, rows, text_columns=(0, 5), small=True)
+    yield note("slices", variant=facts.focus, unit=unit)
+    if links:
+        yield LinkList([*links.items()])
