@@ -54,7 +54,7 @@ def with_frames(sentence: str, numbers: list[str]) -> str:
     """Return a sentence with the frames that show it.
 
     >>> with_frames("All is dark.", ["3", "50"])
-    'All is dark (frames 3, 50).'
+    'All is dark; see frames 3, 50.'
     """
     word = "frames" if len(numbers) > 1 else "frame"
-    return f"{sentence.rstrip('.')} ({word} {', '.join(numbers)})." if numbers else sentence
+    return f"{sentence.rstrip('.')}; see {word} {', '.join(numbers)}." if numbers else sentence

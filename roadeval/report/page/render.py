@@ -135,10 +135,10 @@ def _environment() -> Any:
 def _split_frames(sentence: str) -> list[str]:
     """Split off the numbers of the frames that show what a sentence says; they are at odd places.
 
-    >>> _split_frames("Pavement is called road (frames 3, 50).")
-    ['Pavement is called road (frames ', '3', ', ', '50', ').']
+    >>> _split_frames("Pavement is called road; see frames 3, 50.")
+    ['Pavement is called road; see frames ', '3', ', ', '50', '.']
     """
-    text, start, frames = sentence.rpartition(" (frame")
+    text, start, frames = sentence.rpartition("; see frame")
     first, *others = re.split(r"(\d+)", f"{start}{frames}") if start else [frames]
     return [f"{text}{first}", *others]
 

@@ -1,0 +1,60 @@
+"""Why a variant errs: what is confirmed of its classes, conditions and disturbances."""
+
+from dataclasses import replace
+
+import pandas as pd
+
+from roadeval.evaluation.score.degradation import Degradation
+from roadeval.evaluation.stats.slices import Condition, Slice
+from roadeval.results.tables import read_table
+from roadeval.results.why import explain
+from tests.evaluation.making import a_difference
+from tests.results.making import facts_of
+from tests.results.test_verdict import rates
+
+SHADE = Slice([Condition("shadow", ">", 0.3)], "", 40, 0.3, 0.1, 3.0, 2.0, 4.0, 0.01, [7, 21])
+SURE = replace(a_difference(3, 1, 5), p_holm=0.002, comparisons=2)
+FOG = {"fog-2": Degradation("fog", 2, 0.05, 0.02, SURE)}
+CLASSES = pd.DataFrame(
+    [
+        ("road", "road", 9000, 8000, 0, ""),
+        ("pavement", "other", 5000, 900, 600, "50 3"),
+        ("car", "other", 4000, 300, 400, "9"),
+    ],
+    columns=["name", "truth", "pixels", "road", "beside", "worst"],
+).assign(drive="street", camera="/camera", variant="mine", frames=10, **{"class": [3, 4, 8]})
+FACTS = facts_of(
+    totals={"mine": {"post": rates(0.02)}, "blind": {"post": rates(0.1)}},
+    slices={"mine": [SHADE, replace(SHADE, part="left")]},
+    disturbances={"mine": FOG},
+)
+NO_CLASSES = read_table("classes", "")
+
+
+def test_at_most_four_sentences_name_class_condition_and_disturbance_with_their_frames():
+    assert explain(FACTS, CLASSES) == {
+        "mine": [
+            "75 % of the false road is pavement, 25 % car; see frames 50, 3.",
+            "60 % of the missed road lies beside pavement, 40 % beside car; see frames 50, 3.",
+            "In frames with more than 30 % shade, ERR is 3.0 times the rest (2.0 to 4.0); "
+            "see frames 7, 21.",
+            "fog:2 triples the ERR of mine: 2.0 to 5.0 %. 1 of 1 makes it worse beyond chance.",
+        ]
+    }
+
+
+def test_what_may_be_chance_and_what_is_rare_is_no_reason():
+    chance = {"fog-2": replace(FOG["fog-2"], difference=replace(SURE, p_holm=0.3))}
+    facts = replace(FACTS, slices={"mine": []}, disturbances={"mine": chance})
+    assert explain(facts, NO_CLASSES) == {}
+    rare = CLASSES.assign(pixels=10**7 * (CLASSES["truth"] == "other") + CLASSES["pixels"])
+    assert (
+        explain(facts, rare.assign(road=rare["road"].where(rare["truth"] == "other", 9000))) == {}
+    )
+
+
+def test_frames_of_several_drives_are_not_named():
+    of_drives = replace(SHADE, worst=[7], drives=["lane"])
+    facts = replace(FACTS, slices={"mine": [of_drives]}, disturbances={})
+    (sentence,) = explain(facts, NO_CLASSES)["mine"]
+    assert sentence.endswith("3.0 times the rest (2.0 to 4.0).")
