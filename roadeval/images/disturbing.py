@@ -51,34 +51,33 @@ def to_codes(light: Light) -> Rgb:
     return np.take(_CODE_OF, (np.clip(light, 0, 1) * 65535 + 0.5).astype(np.uint16))
 
 
-class Shot(NamedTuple):
-    """What a disturbance knows of a frame beside its image."""
+Random = np.random.Generator
+Apply = Callable[[Rgb, float, Light, Random], Rgb]
+"""A function of the image, the strength, the depth, and what is drawn at random.
 
-    depth: Light
-    """Metres to the ground, ``(H, W)``; negative above the horizon, NaN where not known."""
-    random: np.random.Generator
+The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN where not known."""
 
 
-def _exposure(image: Rgb, stops: float, _: Shot) -> Rgb:
+def _exposure(image: Rgb, stops: float, *_: object) -> Rgb:
     """Multiply the light by 2^stops, and clip it at white."""
     return np.take(to_codes(_LIGHT_OF * np.float32(2**stops)), image)
 
 
-def _noisy(light: Light, well: float, random: np.random.Generator) -> Rgb:
+def _noisy(light: Light, well: float, random: Random) -> Rgb:
     """Add shot noise and read noise: of e electrons the variance is e + read^2 (EMVA 1288, 2.2)."""
     deviation = np.sqrt(light * np.float32(well) + np.float32(READ_NOISE**2))
     drawn = random.standard_normal(light.shape, np.float32)
     return to_codes(light + deviation * drawn / np.float32(well))
 
 
-def _noise(image: Rgb, strength: float, shot: Shot) -> Rgb:
+def _noise(image: Rgb, strength: float, _: Light, random: Random) -> Rgb:
     """Give white 4096 / 4^(strength - 1) electrons, as a higher gain does."""
-    return _noisy(to_light(image), WELL * 4 ** (1 - strength), shot.random)
+    return _noisy(to_light(image), WELL * 4 ** (1 - strength), random)
 
 
-def _dark(image: Rgb, stops: float, shot: Shot) -> Rgb:
+def _dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
     """Divide the light by 2^stops before it falls on the sensor, whose noise stays."""
-    return _noisy(to_light(image) * np.float32(2**-stops), WELL, shot.random)
+    return _noisy(to_light(image) * np.float32(2**-stops), WELL, random)
 
 
 def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float32]:
@@ -97,12 +96,12 @@ def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float
     return air + (light - air) * through[..., None], air
 
 
-def _fog(image: Rgb, strength: float, shot: Shot) -> Rgb:
+def _fog(image: Rgb, strength: float, depth: Light, _: Random) -> Rgb:
     """Fade in fog of 200 m / strength of visibility V: b = -ln 0.05 / V (WMO-No. 8, chapter 9)."""
-    return to_codes(_veil(to_light(image), -math.log(0.05) * strength / 200, shot.depth)[0])
+    return to_codes(_veil(to_light(image), -math.log(0.05) * strength / 200, depth)[0])
 
 
-def _blur(image: Rgb, strength: float, _: Shot) -> Rgb:
+def _blur(image: Rgb, strength: float, *_: object) -> Rgb:
     """Put the lens out of focus: a point is a disk of light, of radius width / 320 x strength."""
     import cv2
 
@@ -126,7 +125,7 @@ def _spots(height: int, width: int, strength: float) -> Light:
     return (1 - clear).astype(np.float32)
 
 
-def _dirt(image: Rgb, strength: float, _: Shot) -> Rgb:
+def _dirt(image: Rgb, strength: float, *_: object) -> Rgb:
     """Look through 12 soft spots a strength, which dim and scatter light (Gu et al., 2009, eq. 2).
 
     A covered pixel keeps a fifth of its light, and gets a quarter of the image's mean.
@@ -136,7 +135,7 @@ def _dirt(image: Rgb, strength: float, _: Shot) -> Rgb:
     return to_codes(light + (scattered - np.float32(0.8) * light) * covered)
 
 
-def _rain(image: Rgb, strength: float, shot: Shot) -> Rgb:
+def _rain(image: Rgb, strength: float, depth: Light, random: Random) -> Rgb:
     """Fade as in rain of R = 25 mm/h x strength, b = 0.312 R^0.67 / km (Halder et al., 2019).
 
     Then 300 streaks a strength, near ones longer: L (1 - a) + A a, with the light A of the air,
@@ -145,9 +144,9 @@ def _rain(image: Rgb, strength: float, shot: Shot) -> Rgb:
     import cv2
 
     height, width = image.shape[:2]
-    light, air = _veil(to_light(image), 0.312e-3 * (25 * strength) ** 0.67, shot.depth)
-    streaks, slant = np.zeros((height, width), np.uint8), shot.random.normal(0.1, 0.05)
-    for x, y, near, thick in shot.random.random((round(300 * strength), 4)):
+    light, air = _veil(to_light(image), 0.312e-3 * (25 * strength) ** 0.67, depth)
+    streaks, slant = np.zeros((height, width), np.uint8), random.normal(0.1, 0.05)
+    for x, y, near, thick in random.random((round(300 * strength), 4)):
         length = height * (0.02 + 0.1 * near**2)
         left, top = (1.2 * x - 0.1) * width, (1.1 * y - 0.1) * height
         start, end = ((round(left + y * slant), round(top + y)) for y in (0, length))
@@ -157,7 +156,7 @@ def _rain(image: Rgb, strength: float, shot: Shot) -> Rgb:
     return to_codes(light + (air - light) * part)
 
 
-def _jpeg(image: Rgb, quality: float, _: Shot) -> Rgb:
+def _jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
     """Compress as a JPEG of this quality, as libjpeg counts it."""
     import cv2
 
@@ -170,7 +169,7 @@ class Kind(NamedTuple):
     """A kind of disturbance, with the meaning and the range of its strength."""
 
     title: str
-    apply: Callable[[Rgb, float, Shot], Rgb]
+    apply: Apply
     least: float
     most: float
 
@@ -223,15 +222,15 @@ class Disturbance(NamedTuple):
     def of(self, image: Rgb, frame: int, depth: Light | None = None) -> Rgb:
         """Return an image, ``(H, W, 3)`` uint8 RGB, with this disturbance.
 
-        ``frame`` seeds what is drawn at random; ``depth`` is that of `Shot`, by default of
-        `assumed_depth`.
+        ``frame`` seeds what is drawn at random; ``depth`` is that of `Apply`, by default
+        of `assumed_depth`.
         """
         if self.strength == 0:
             return image
         if depth is None or depth.shape != image.shape[:2]:
             depth = assumed_depth(*image.shape[:2])
         random = np.random.default_rng((zlib.crc32(self.kind.encode()), frame))
-        return KINDS[self.kind].apply(image, self.strength, Shot(depth, random))
+        return KINDS[self.kind].apply(image, self.strength, depth, random)
 
 
 @lru_cache(4)

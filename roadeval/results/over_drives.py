@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE
 from roadeval.data.words import listing
 from roadeval.evaluation.metrics import METRICS, TESTED
-from roadeval.evaluation.score.degradation import Degradations, as_corrected
+from roadeval.evaluation.score.degradation import Degradation, Degradations, as_corrected
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, over_drives, strata
@@ -104,21 +104,19 @@ def _degradations(
         return next(iter(by_drive.values()))
     rows = pd.DataFrame(
         [
-            (variant, name, drive, groups[drive], change.difference.mean, change)
+            {**vars(change), "variant": variant, "name": name, "drive": drive}
             for drive, variants in by_drive.items()
             for variant, changes in variants.items()
             for name, change in changes.items()
-        ],
-        columns=["variant", "name", "drive", "group", "mean", "change"],
+        ]
     )
     means = {}
-    for names, drives in group_rows(rows, ["variant", "name"]):
-        changes, over = drives["change"], over_drives(drives, confidence)
-        error, base = (
-            float(pd.Series([getattr(change, name) for change in changes], dtype=float).mean())
-            for name in ("ERR", "base_ERR")
-        )
-        means[names] = replace(changes.iloc[0], ERR=error, base_ERR=base, difference=over)
+    for names, part in group_rows(rows, ["variant", "name"]) if by_drive else ():
+        mean = [change.mean for change in part["difference"]]
+        over = over_drives(part.assign(mean=mean, group=part["drive"].map(groups)), confidence)
+        error, base = map(float, part[["ERR", "base_ERR"]].astype(float).mean())
+        first = part.iloc[0]
+        means[names] = Degradation(first["kind"], first["strength"], error, base, over)
     return as_corrected(means)
 
 

@@ -7,6 +7,7 @@ import pytest
 import roadeval
 from roadeval.config.tables import ConfigError
 from roadeval.images.disturbing import Disturbance
+from roadeval.jobs.results.result import number_settings
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import settings, write_log
 
@@ -149,3 +150,9 @@ def test_a_fleet_averages_its_drives(tmp_path):
     assert pytest.approx(by_drive.mean()) == change.ERR
     assert change.difference.mean == pytest.approx(change.ERR - change.base_ERR)
     assert outcome.facts.disturbances == result.facts.disturbances
+
+
+def test_other_disturbances_change_no_number_that_is_compared():
+    by_text = [roadeval.configure({"frames": {"disturb": texts}}) for texts in ([], [FOG])]
+    plain, foggy = (number_settings(config.as_dict()) for config in by_text)
+    assert plain == foggy
