@@ -81,7 +81,7 @@ class Suspect(NamedTuple):
     reason: str
     """A `Reason`."""
     detail: str
-    """The other frame's number, or the move in pixels; else empty."""
+    """The other frame's number, the move in pixels, or what an area is instead; else empty."""
     top: int
     left: int
     bottom: int
@@ -260,6 +260,7 @@ def _suspect(
         reason, area = Reason.SPECKS, (is_speck & (scores > 0))[areas]
     else:
         reason = _look_at(view, road, area, jump)
+        detail = "no road" if road[area].mean() > 0.5 else "road"
     rows, columns = (np.flatnonzero(area.any(axis=axis)) * view.times for axis in (1, 0))
     ends = int(rows[-1]) + view.times, int(columns[-1]) + view.times
     top, left, pixels = int(rows[0]), int(columns[0]), int(area.sum()) * view.times**2
