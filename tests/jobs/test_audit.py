@@ -12,6 +12,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError, RunConfig
+from roadeval.cli.app import main
 from roadeval.jobs.results.audit import Audit
 from roadeval.logs.log import describe
 from roadeval.logs.writing.writer import LogWriter
@@ -161,3 +162,15 @@ def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: 
 def test_an_annotator_without_masks_is_refused(place: Path) -> None:
     with pytest.raises(RoadevalError, match="no masks of c"):
         roadeval.audit(place / "drive.rrd", annotators=["c"])
+
+
+def test_the_command_shows_what_is_wrong_and_what_to_type_next(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["audit", str(place / "drive.rrd"), "-n", "3", "-o", str(tmp_path / "x")]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("The labels of 3 frames look wrong: ")
+    assert "left and right are exchanged" in shown
+    assert f"--config {place / 'drive.rrd'} --truth {tmp_path / 'x'}" in shown
+    assert main(["audit", str(place / "drive.rrd"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["suspects"][0]["clear"] is True
