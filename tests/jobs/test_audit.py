@@ -174,3 +174,5 @@ def test_the_command_shows_what_is_wrong_and_what_to_type_next(
     assert f"--config {place / 'drive.rrd'} --truth {tmp_path / 'x'}" in shown
     assert main(["audit", str(place / "drive.rrd"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["suspects"][0]["clear"] is True
+    assert main(["audit", str(place / "drive.rrd"), "--truth", str(place / "mine")]) == 2
+    assert "a result has its truth and masks; give the log" in capsys.readouterr().err

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -21,7 +20,6 @@ from roadeval.data.arrays import Flags, Image, Plane, Values
 from roadeval.evaluation.tables import near_ns, separate
 
 if TYPE_CHECKING:
-    import cv2
     import pandas as pd
 
 BLOCK: Final = 400
@@ -64,12 +62,11 @@ class Reason(StrEnum):
     MOVED = "moved"
     SPECKS = "specks"
     CUT = "cut"
-    SHADOW = "shadow"
     JUMP = "jump"
     METHODS = "methods"
 
 
-_DOUBTFUL: Final = (Reason.CUT, Reason.SHADOW, Reason.METHODS)
+_DOUBTFUL: Final = (Reason.CUT, Reason.METHODS)
 """Reasons that a method's own mistake may look like."""
 
 
@@ -179,7 +176,8 @@ def _carry_label(views: Sequence[LabelledView], place: int, other: int) -> Plane
     if not 0 <= other < len(views):
         return None
     view, near = views[place], views[other]
-    flow = _flow().calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
+    dense = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    flow = dense.calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
     height, width = view.grey.shape
     x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     x, y = x + flow[..., 0], y + flow[..., 1]
@@ -304,18 +302,8 @@ def _look_at(view: LabelledView, road: Flags, area: Flags, jump: Flags) -> Reaso
     rim = edge & (cv2.dilate(area.astype(np.uint8), cross) > 0)
     y, x = np.nonzero(rim)
     slopes = cv2.morphologyEx(cv2.GaussianBlur(view.grey, (5, 5), 1), cv2.MORPH_GRADIENT, cross)
-    is_removed = not road[area].mean() > 0.5
-    if is_removed and len(x) >= _LONG:
+    if road[area].mean() < 0.5 and len(x) >= _LONG:
         across = float(np.sqrt(np.linalg.eigvalsh(np.cov(x, y))[0]))
         if across < 1.5 and slopes[rim].mean() < 0.5 * slopes[edge & ~rim].mean():
             return Reason.CUT
-    if is_removed and road.any() and view.grey[area].mean() < 0.75 * view.grey[road].mean():
-        return Reason.SHADOW
     return Reason.METHODS
-
-
-@cache
-def _flow() -> cv2.DISOpticalFlow:
-    import cv2
-
-    return cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)

@@ -102,8 +102,9 @@ def audit(
             raise RoadevalError(f"{path}: a fleet: audit its drives one by one")
         ((path, drive, run),) = drives
         shares, tables, labelled = dict[str, list[float]](), [], 0
-        frames = _labelled_views(drive, annotators, shares)
-        while views := [*islice(frames, BLOCK)]:
+        frames, total = _labelled_views(drive, annotators, shares), len(drive.pictured)
+        alike = -(-total // max(-(-total // BLOCK), 1))  # no block is much smaller than others
+        while views := [*islice(frames, alike)]:
             tables.append(find_suspects(views))
             labelled += len(views)
         if not labelled:
