@@ -45,7 +45,7 @@ class Program(TyperGroup):
         self.format_commands(ctx, formatter)
         if with_options:
             _write_groups(self, ctx, formatter)
-        formatter.write_paragraph()
+            formatter.write_paragraph()
         formatter.write_text(READ_ON)
         formatter.write_text(EXIT_CODES)
 

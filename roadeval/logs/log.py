@@ -237,8 +237,8 @@ class Log:
         """Return the truth with the labels in some folders in place of its own."""
         sources = [self._beside_log(MaskSettings(path=path), selection) for path in folders]
         notes = [
-            f"corrected labels of {counted(len(source.pictures), 'frame')} from {source.where}; "
-            f"all other frames have those of {truth.where}"
+            f"the labels of {counted(len(source.pictures), 'frame')} are from {source.where}; "
+            f"all others are those of {truth.where}"
             for source in sources
         ]
 

@@ -17,9 +17,8 @@ _REASONS: Final[Mapping[str, str]] = {
     Reason.MOVED: "it lies {} of its place",
     Reason.SPECKS: "specks or holes that nothing else has",
     Reason.CUT: "the road ends at a straight edge that the picture lacks",
-    Reason.SHADOW: "the road ends at something dark, as a shadow",
-    Reason.JUMP: "the labels before and after differ, the picture does not",
-    Reason.METHODS: "methods that are right here elsewhere differ",
+    Reason.JUMP: "the labels before and after say {} in the same place",
+    Reason.METHODS: "methods that are right here elsewhere see {}",
 }
 
 

@@ -12,6 +12,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError, RunConfig
+from roadeval.cli.app import main
 from roadeval.jobs.results.audit import Audit
 from roadeval.logs.log import describe
 from roadeval.logs.writing.writer import LogWriter
@@ -78,9 +79,9 @@ def truths(place: Path, folder: Path, tmp_path: Path) -> dict[int, np.ndarray]:
     done = roadeval.replay(
         place / "drive.mcap", config, save=tmp_path / "o.rrd", reports=tmp_path / "r"
     )
-    said = [text for text in done.warnings if "corrected labels" in text]
+    said = [text for text in done.warnings if "the labels of" in text]
     assert len(said) == 1
-    assert said[0].endswith("all other frames have those of /truth/road")
+    assert said[0].endswith("all others are those of /truth/road")
     recording = roadeval.Recording(tmp_path / "o.rrd")
     return {frame: recording.truth(frame) for frame in range(FRAMES)}
 
@@ -161,3 +162,17 @@ def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: 
 def test_an_annotator_without_masks_is_refused(place: Path) -> None:
     with pytest.raises(RoadevalError, match="no masks of c"):
         roadeval.audit(place / "drive.rrd", annotators=["c"])
+
+
+def test_the_command_shows_what_is_wrong_and_what_to_type_next(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["audit", str(place / "drive.rrd"), "-n", "3", "-o", str(tmp_path / "x")]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("The labels of 3 frames look wrong: ")
+    assert "left and right are exchanged" in shown
+    assert f"--config {place / 'drive.rrd'} --truth {tmp_path / 'x'}" in shown
+    assert main(["audit", str(place / "drive.rrd"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["suspects"][0]["clear"] is True
+    assert main(["audit", str(place / "drive.rrd"), "--truth", str(place / "mine")]) == 2
+    assert "a result has its truth and masks; give the log" in capsys.readouterr().err

@@ -43,7 +43,7 @@ MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
 ELSEWHERE = (
     *(".venv/", "reports/", "recordings/", "build/", "masks/", "images/", "../shared/"),
-    *("to_label/", "labels/", "proposals/"),
+    *("to_label/", "to_check/", "labels/", "proposals/"),
 )
 """Where runs write, and what users bring."""
 

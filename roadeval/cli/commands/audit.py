@@ -6,6 +6,8 @@ from pathlib import Path
 from shlex import join, quote
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import typer
+
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import OptionValues, takes
@@ -50,12 +52,14 @@ def audit(
         roadeval audit drive.mcap --truth labels/ -o to_check
         roadeval audit recordings/drive.rrd --annotator b
 
-    A label looks wrong where methods that are right elsewhere agree against it, where it differs
-    from the labels before and after though the picture does not change, where it has specks, holes
-    or cut edges, and where another frame, a mirror or a move explains it. FOLDER/suspects shows
-    where, FOLDER/proposals has the present labels; put the corrected ones into FOLDER/labels.
-    'replay --truth FOLDER' then reads these in place of the drive's own.
+    A label looks wrong where methods that are right elsewhere agree against it, or the labels
+    before and after; where it has specks, holes or cut edges; and where another frame, a mirror or
+    a move explains it. FOLDER/suspects shows where, FOLDER/proposals has the present labels; put
+    the corrected ones into FOLDER/labels. 'replay --truth FOLDER' reads these in place of the
+    drive's own.
     """
+    if options and (source.suffix == ".rrd" or (source / "summary.json").is_file()):
+        raise typer.BadParameter(f"{source}: a result has its truth and masks; give the log")
     arguments.check_one_camera(options)
     config = arguments.configuration(options)
     from roadeval.jobs.results.audit import audit as run

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -21,7 +20,6 @@ from roadeval.data.arrays import Flags, Image, Plane, Values
 from roadeval.evaluation.tables import near_ns, separate
 
 if TYPE_CHECKING:
-    import cv2
     import pandas as pd
 
 BLOCK: Final = 400
@@ -64,12 +62,11 @@ class Reason(StrEnum):
     MOVED = "moved"
     SPECKS = "specks"
     CUT = "cut"
-    SHADOW = "shadow"
     JUMP = "jump"
     METHODS = "methods"
 
 
-_DOUBTFUL: Final = (Reason.CUT, Reason.SHADOW, Reason.METHODS)
+_DOUBTFUL: Final = (Reason.CUT, Reason.METHODS)
 """Reasons that a method's own mistake may look like."""
 
 
@@ -81,7 +78,7 @@ class Suspect(NamedTuple):
     reason: str
     """A `Reason`."""
     detail: str
-    """The other frame's number, or the move in pixels; else empty."""
+    """The other frame's number, the move in pixels, or what an area is instead; else empty."""
     top: int
     left: int
     bottom: int
@@ -179,7 +176,8 @@ def _carry_label(views: Sequence[LabelledView], place: int, other: int) -> Plane
     if not 0 <= other < len(views):
         return None
     view, near = views[place], views[other]
-    flow = _flow().calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
+    dense = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    flow = dense.calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
     height, width = view.grey.shape
     x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     x, y = x + flow[..., 0], y + flow[..., 1]
@@ -260,6 +258,7 @@ def _suspect(
         reason, area = Reason.SPECKS, (is_speck & (scores > 0))[areas]
     else:
         reason = _look_at(view, road, area, jump)
+        detail = "no road" if road[area].mean() > 0.5 else "road"
     rows, columns = (np.flatnonzero(area.any(axis=axis)) * view.times for axis in (1, 0))
     ends = int(rows[-1]) + view.times, int(columns[-1]) + view.times
     top, left, pixels = int(rows[0]), int(columns[0]), int(area.sum()) * view.times**2
@@ -277,7 +276,7 @@ def _explain(
     expected, before = road ^ wrong, float(wrong.mean())
     if before < _SMALL or min(road.shape) <= 2 * _REACH:
         return None, ""
-    unlike = (roads ^ road).mean(axis=(1, 2))
+    unlike = (roads[:, ::2, ::2] ^ road[::2, ::2]).mean(axis=(1, 2))
     unlike[place] = 1
     if unlike.min() < 0.1 * before:
         return Reason.ANOTHER_FRAME, str(views[unlike.argmin()].frame)
@@ -303,18 +302,8 @@ def _look_at(view: LabelledView, road: Flags, area: Flags, jump: Flags) -> Reaso
     rim = edge & (cv2.dilate(area.astype(np.uint8), cross) > 0)
     y, x = np.nonzero(rim)
     slopes = cv2.morphologyEx(cv2.GaussianBlur(view.grey, (5, 5), 1), cv2.MORPH_GRADIENT, cross)
-    is_removed = not road[area].mean() > 0.5
-    if is_removed and len(x) >= _LONG:
+    if road[area].mean() < 0.5 and len(x) >= _LONG:
         across = float(np.sqrt(np.linalg.eigvalsh(np.cov(x, y))[0]))
         if across < 1.5 and slopes[rim].mean() < 0.5 * slopes[edge & ~rim].mean():
             return Reason.CUT
-    if is_removed and road.any() and view.grey[area].mean() < 0.75 * view.grey[road].mean():
-        return Reason.SHADOW
     return Reason.METHODS
-
-
-@cache
-def _flow() -> cv2.DISOpticalFlow:
-    import cv2
-
-    return cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)

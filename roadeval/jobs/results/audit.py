@@ -102,8 +102,9 @@ def audit(
             raise RoadevalError(f"{path}: a fleet: audit its drives one by one")
         ((path, drive, run),) = drives
         shares, tables, labelled = dict[str, list[float]](), [], 0
-        frames = _labelled_views(drive, annotators, shares)
-        while views := [*islice(frames, BLOCK)]:
+        frames, total = _labelled_views(drive, annotators, shares), len(drive.pictured)
+        alike = -(-total // max(-(-total // BLOCK), 1))  # no block is much smaller than others
+        while views := [*islice(frames, alike)]:
             tables.append(find_suspects(views))
             labelled += len(views)
         if not labelled:
@@ -195,13 +196,14 @@ def _write_audit(
 
 
 def _mark(image: Image, truth: Plane, suspect: Mapping[str, Any]) -> Image:
-    """Return an image with the edge of its truth in yellow, and a red box around an area."""
+    """Return an image with its road in green, edged yellow, and a red box around an area."""
     import cv2
 
-    marked = image.copy()
-    square = np.ones((3, 3), np.uint8)
-    edge = cv2.morphologyEx((truth == ROAD).astype(np.uint8), cv2.MORPH_GRADIENT, square)
+    marked, road, square = image.copy(), truth == ROAD, np.ones((3, 3), np.uint8)
+    marked[road] = 0.7 * marked[road] + 0.3 * np.array(colours.ROAD)
+    edge = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_GRADIENT, square)
     marked[edge > 0] = colours.YELLOW
-    corner, opposite = ((suspect[x], suspect[y]) for x, y in (("left", "top"), ("right", "bottom")))
+    corner = suspect["left"] - 4, suspect["top"] - 4
+    opposite = suspect["right"] + 3, suspect["bottom"] + 3
     cv2.rectangle(marked, corner, opposite, colours.VERMILLION, 3)
     return marked
