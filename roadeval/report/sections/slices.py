@@ -44,7 +44,7 @@ def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[
             frames = [f"{names.get(drive, drive)} {frame}" for drive, frame in pairs]
         elif level == 1:
             links |= {f"Frame {frame}": f"#frame-{frame}" for frame in frames}
-        ratio = f"{found.ratio:.2f} ({found.low:.2f} to {found.high:.2f})"
+        ratio = f"{found.ratio:.1f} ({found.low:.1f} to {found.high:.1f})"
         rates = percent(found.inside), percent(found.outside)
         place = describe_place(found)
         rows.append([place, number(found.frames), *rates, ratio, ", ".join(frames)])
