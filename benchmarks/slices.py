@@ -91,7 +91,7 @@ def make_drive(
 
 def make_fleet(
     rng: Random, reals: Sequence[pd.DataFrame], groups: int, plant: Plant | None = None
-) -> list[pd.DataFrame]:
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Return the rows of a made-up fleet: drives of 60 frames that err unequally, with a tag."""
     tables: list[list[pd.DataFrame]] = [[], [], []]
     for place in range(groups):
@@ -102,14 +102,16 @@ def make_fleet(
         made[1]["group"], made[1]["tag_weather"] = f"d{place:03d}", rng.choice(["dry", "rain"])
         for table, rows in zip(tables, made, strict=True):
             table.append(rows)
-    return [pd.concat(rows, ignore_index=True) for rows in tables]
+    frames, conditions, parts = (pd.concat(rows, ignore_index=True) for rows in tables)
+    return frames, conditions, parts
 
 
-def plants(effect: float) -> Iterator[tuple[str, str, Plant]]:
+def plants(effect: float, reals: Sequence[pd.DataFrame]) -> Iterator[tuple[str, str, Plant]]:
     """Yield the kinds of planted effects: a name, the quantity, and the factors."""
+    of_all = pd.concat(reals)
 
     def inside(frames: pd.DataFrame, name: str, share: float) -> npt.NDArray[np.bool_]:
-        return (frames[name] > frames[name].quantile(1 - share)).to_numpy()
+        return (frames[name] > of_all[name].quantile(1 - share)).to_numpy()
 
     def one(frames: pd.DataFrame, error: Values) -> Values:
         factor = np.where(inside(frames, "brightness", 0.4), effect, 1)
@@ -158,21 +160,23 @@ def main() -> None:
     )
     print("|---|---|--:|--:|--:|--:|", flush=True)
     for effect in EFFECTS:
-        for kind, what, plant in plants(effect):
+        for kind in ("one", "two", "part"):
             for size in (90, 300, 1000, "24 drives"):
                 runs = []
                 for seed in range(asked.seeds):
-                    rng = np.random.default_rng([3, seed])
+                    rng, real = np.random.default_rng([3, seed]), reals[seed % len(reals)]
+                    of_drive = not isinstance(size, str)
+                    planted = {
+                        k: rest for k, *rest in plants(effect, [real] if of_drive else reals)
+                    }
+                    what, plant = planted[kind]
                     if isinstance(size, str):
-                        fleet = make_fleet(rng, reals, 24, plant)
-                        runs.append(find_slices(*fleet, CONFIDENCE, over_drives=True))
-                        continue
-                    memory = MEMORIES[seed % 3]
-                    made = make_drive(rng, reals[seed % len(reals)], size, memory, plant)
-                    runs.append(find_slices(*made, CONFIDENCE))
-                found, right = (
-                    100 * np.mean([*x]) for x in (map(bool, runs), (names(r, what) for r in runs))
-                )
+                        made = make_fleet(rng, reals, 24, plant)
+                    else:
+                        made = make_drive(rng, real, size, MEMORIES[seed % 3], plant)
+                    slices = find_slices(*made, CONFIDENCE, over_drives=not of_drive)
+                    runs.append((bool(slices), names(slices, what)))
+                found, right = 100 * np.mean(runs, axis=0)
                 of = size if isinstance(size, str) else f"{size} frames"
                 print(f"| {kind} | {of} | {effect} | {found:.0f} | {right:.0f} |", flush=True)
 

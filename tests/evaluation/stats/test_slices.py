@@ -8,8 +8,6 @@ from benchmarks.slices import make_drive, make_fleet, names, plants, walk
 from roadeval.evaluation.score.conditions import QUANTITIES
 from roadeval.evaluation.stats.slices import Condition, find_slices
 
-PLANTS = {name: (what, plant) for name, what, plant in plants(3)}
-
 
 def conditions(seed: int, frames: int = 400) -> pd.DataFrame:
     """Conditions of a made-up drive, each with a memory of its own."""
@@ -17,6 +15,10 @@ def conditions(seed: int, frames: int = 400) -> pd.DataFrame:
     memories = (2, 5, 10, 20, 40, 80, 160)
     pairs = zip(QUANTITIES, memories, strict=True)
     return pd.DataFrame({name: walk(rng, frames, memory) for name, memory in pairs})
+
+
+REALS = [conditions(seed) for seed in range(6)]
+PLANTS = {name: (what, plant) for name, what, plant in plants(3, REALS)}
 
 
 def test_at_most_one_of_twenty_null_drives_names_a_slice() -> None:
@@ -50,8 +52,7 @@ def test_numbers_are_of_the_confirming_half_and_the_worst_frames_are_apart() -> 
 
 
 def test_a_fleet_names_a_planted_slice_with_the_drives_of_its_worst_frames() -> None:
-    reals = [conditions(seed) for seed in range(6)]
-    fleet = make_fleet(np.random.default_rng(5), reals, 40, PLANTS["one"][1])
+    fleet = make_fleet(np.random.default_rng(5), REALS, 40, PLANTS["one"][1])
     found = find_slices(*fleet, 0.95, over_drives=True)
     assert names(found, "brightness")
     assert len({*found[0].drives}) == 3

@@ -41,7 +41,8 @@ def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
 )
 def test_where_no_slice_holds_a_sentence_says_so(frames, slices, begin):
     heading, sentence = blocks(frames, **slices)
-    assert isinstance(heading, Heading) and isinstance(sentence, Text)
+    assert isinstance(heading, Heading)
+    assert isinstance(sentence, Text)
     assert sentence.text.startswith(begin)
 
 
