@@ -156,9 +156,9 @@ def main() -> None:
         null_fleets += bool(find_slices(*fleet, CONFIDENCE, over_drives=True))
     print(f"{null_drives} of {asked.drives} null drives name a slice, {null_fleets} null fleets.\n")
     print(
-        "| planted | of | effect | names a slice, % | with what was planted, % | ratio holds, % |"
+        "| planted | of | effect | names a slice, % | with what was planted, % |"
     )
-    print("|---|---|--:|--:|--:|--:|", flush=True)
+    print("|---|---|--:|--:|--:|", flush=True)
     for effect in EFFECTS:
         for kind in ("one", "two", "part"):
             for size in (90, 300, 1000, "24 drives"):

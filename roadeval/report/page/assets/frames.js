@@ -36,6 +36,12 @@ class Browser {
         this.show(Number(row.dataset.frame));
       });
     }
+    for (const link of document.querySelectorAll('.links a[href^="#frame-"]')) {
+      link.addEventListener("click", (event) => {
+        event.preventDefault();
+        this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
+      });
+    }
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
     range.frames = this.data.frames;
     range.onChange.push(() => this.narrow());
