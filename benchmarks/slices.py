@@ -155,9 +155,7 @@ def main() -> None:
         fleet = make_fleet(np.random.default_rng([2, seed]), reals, GROUPS[seed % len(GROUPS)])
         null_fleets += bool(find_slices(*fleet, CONFIDENCE, over_drives=True))
     print(f"{null_drives} of {asked.drives} null drives name a slice, {null_fleets} null fleets.\n")
-    print(
-        "| planted | of | effect | names a slice, % | with what was planted, % |"
-    )
+    print("| planted | of | effect | names a slice, % | with what was planted, % |")
     print("|---|---|--:|--:|--:|", flush=True)
     for effect in EFFECTS:
         for kind in ("one", "two", "part"):

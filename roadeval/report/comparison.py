@@ -42,7 +42,7 @@ Columns = dict[str, Callable[[Any], Cell | str]]
 """The function that makes a row's cell in each column, by the columns' titles."""
 NAMED: Final = 20
 """Most drives in the table of a mask's changed drives."""
-CHANGE: Final = ("base %", "new %", "change pp", "interval pp")
+CHANGE: Final = ("base %", "new %", "change", "interval")
 """The titles of a change's columns."""
 _COMMAND: Final = "in the viewer"
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp")

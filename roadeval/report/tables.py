@@ -6,7 +6,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
-from roadeval.data.words import DASH, MINUS, defined, listing, number, percent, points, short_names
+from roadeval.data.words import (
+    DASH,
+    MINUS,
+    defined,
+    in_percent,
+    listing,
+    number,
+    percent,
+    points,
+    short_names,
+)
 from roadeval.evaluation.metrics import FULL, METRICS, SHORT, SHORT_UNTABLED, TESTED, UNTABLED
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.captions import caption
@@ -128,14 +138,15 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
                 *([] if brief else won),
             ]
         )
-    ends = [] if brief else ["from, %", "to, %"]
+    ends = [] if brief else ["from", "to"]
     counts = [] if brief else ["better", "worse", *(["effective"] if unit == "frames" else [])]
-    others = [f"{rate}, pp" for rate in OTHERS]
+    interval = f"{in_percent(effects[0].rates[TESTED].confidence):g} % interval"
+    wide = [("", 1), ("ERR, %", 2), ("points", 2 + len(OTHERS)), (unit, len(counts))]
     return Table(
-        ["difference", *ends, "ERR, pp", "interval, pp", *others, *counts],
+        ["difference" + ", points" * brief, *ends, TESTED, interval, *OTHERS, *counts],
         rows,
         breaks=[place for place, (a, b) in enumerate(pairwise(effects), 1) if a.base != b.base],
-        groups=[("", 1), ("ERR", 4), ("", len(OTHERS)), (unit, len(counts))] if counts else (),
+        groups=[] if brief else wide,
         small=True,
     )
 

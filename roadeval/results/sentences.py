@@ -25,9 +25,6 @@ MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
 """Least difference between errors and stated errors that `describe_overconfidence` reports."""
-_OF_FILTER: Final = "The filter "
-"""Beginning of the note on the filter's effect on a frame."""
-
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
@@ -46,16 +43,18 @@ _WHY: Final = {
 """Words behind a number of frames, by the reasons of `roadeval.results.facts.FrameAccount`."""
 
 
-def account(frames: FrameAccount, windows: int | None = None) -> str:
+def account(frames: FrameAccount, windows: int = 0, size: int = 10) -> str:
     """Return how many frames of a log were evaluated, and why the others were not.
 
+    ``windows`` are the groups of ``size`` frames that they make.
+
     >>> account(FrameAccount(in_log=100, evaluated=90, skipped={"trained on": 10}), 9)
-    '90 of 100 frames were evaluated, in 9 windows. Left out: 10 to train on.'
+    '90 of 100 frames were evaluated, in 9 groups of 10. Left out: 10 to train on.'
     """
     total = frames.evaluated if frames.in_log is None else frames.in_log
     of = "" if frames.evaluated == total else f"{number(frames.evaluated)} of "
     verb = "was" if frames.evaluated == 1 else "were"
-    within = f", in {counted(windows, 'window')}" if windows else ""
+    within = f", in {counted(windows, 'group')} of {size}" if windows else ""
     sentence_on_frames = f"{of}{counted(total, 'frame')} {verb} evaluated{within}."
     why = [f"{number(count)} {_WHY.get(name, name)}" for name, count in frames.skipped.items()]
     return f"{sentence_on_frames} Left out: {', '.join(why)}." if why else sentence_on_frames
@@ -187,55 +186,56 @@ def describe_part(part: str) -> str:
     return f"in the {part} half of the image" if part in ("left", "right") else f"on {part}"
 
 
-def describe_slice(found: Slice) -> str:
+def describe_slice(failure: Slice) -> str:
     """Return where ERR is higher, and by how much, as a sentence.
 
     >>> shade = Condition("shadow", ">", 0.3)
     >>> describe_slice(Slice([shade], "20-80m", 90, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01))
     'In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest (1.8 to 4.9).'
     """
-    words = describe_place(found)
+    words = describe_place(failure)
     return (
-        f"{words[0].upper()}{words[1:]}, ERR is {found.ratio:.1f} times the rest "
-        f"({found.low:.1f} to {found.high:.1f})."
+        f"{words[0].upper()}{words[1:]}, ERR is {failure.ratio:.1f} times the rest "
+        f"({failure.low:.1f} to {failure.high:.1f})."
     )
 
 
-def describe_place(found: Slice) -> str:
+def describe_place(failure: Slice) -> str:
     """Return which frames, and which part of them, a slice is."""
-    conditions = " and ".join(map(describe_condition, found.conditions))
-    parts = [f"in frames {conditions}" * bool(conditions), found.part and describe_part(found.part)]
+    conditions = " and ".join(map(describe_condition, failure.conditions))
+    parts = [
+        f"in frames {conditions}" * bool(conditions),
+        failure.part and describe_part(failure.part),
+    ]
     return ", ".join(filter(None, parts))
-
-
-def without_filter(notes: Iterable[str]) -> list[str]:
-    """Return a frame's notes without the one on the filter, whose effect is shown apart."""
-    return [note for note in notes if not note.startswith(_OF_FILTER)]
 
 
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
     """Return the notes on a frame from its tallies; none on a frame that is not evaluated."""
     finals = {tally.variant: tally.rates for tally in tallies}
-    blind = finals.pop(BASELINE, None)
-    return tuple(notes(finals, blind))
+    return tuple(notes(finals))
 
 
-def notes(
-    finals: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
-) -> Iterator[str]:
-    """Yield what a person should know of a frame, by the final masks' rates and the baseline's."""
-    if FILTERED in finals and UNFILTERED in finals:
+def notes(finals: Mapping[str, Mapping[str, float]], focus: str | None = None) -> Iterator[str]:
+    """Yield what a person should know of a frame, by the rates of final masks.
+
+    With a ``focus`` they are about this variant alone, beside its rates.
+    """
+    blind = finals.get(BASELINE)
+    variants = [name for name in finals if name != BASELINE and focus in (None, name)]
+    if FILTERED in variants and UNFILTERED in finals:
         change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
         if abs(change) >= NOTEWORTHY:
             verb = "raised" if change > 0 else "lowered"
-            yield f"{_OF_FILTER}{verb} ERR by {percent(abs(change), 1)} points on this frame."
-    for name, rates in finals.items():
+            yield f"The filter {verb} ERR by {percent(abs(change), 1)} points on this frame."
+    for name in variants if focus is None else ():
+        rates = finals[name]
         if rates["FNR"] >= FAILED_FNR:
             yield f"{name} finds {percent(1 - rates['FNR'], 1)} % of the road."
         elif rates["ERR"] >= FAILED_ERR:
             yield f"{name} gets {percent(rates['ERR'], 1)} % of the pixels wrong."
-    for name, rates in finals.items():
-        if blind is not None and (excess := rates["ERR"] - blind["ERR"]) >= NOTEWORTHY:
+    for name in variants:
+        if blind and (excess := finals[name]["ERR"] - blind["ERR"]) >= NOTEWORTHY:
             yield (
                 f"{name} is {percent(excess, 1)} points worse than {BASELINE} "
                 f"(ERR {percent(blind['ERR'], 1)} %)."

@@ -263,11 +263,11 @@ def _next_step(
 ) -> Iterator[str]:
     """Yield what to do next: set the threshold, or try the preset that is best on real roads.
 
-    A threshold is not told if fewer pixels are hardly wrong at it.
+    A threshold is not told if fewer pixels are hardly wrong at it, or if nothing is road above it.
     """
     own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
     best = thresholds.get(focus)
-    if best and defined(pooled) and pooled - best[TESTED] >= ROUNDING:
+    if best and best["threshold"] < 1 and defined(pooled) and pooled - best[TESTED] >= ROUNDING:
         digits = 1 if pooled - best[TESTED] >= FINE else 2
         lines = best.get("lines") or f"threshold = {best['threshold']:.2g}"
         setting = "`, `".join(lines.splitlines())

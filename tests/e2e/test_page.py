@@ -76,7 +76,7 @@ def drag(tab, chart, start, end):
     """Drag over a part of a chart, from and to shares of its width."""
     chart.scroll_into_view_if_needed()
     box = None
-    while box != (box := chart.bounding_box()):  # The film's picture may still grow above the chart.
+    while box != (box := chart.bounding_box()):  # The film may still grow above.
         tab.wait_for_timeout(200)
     tab.mouse.move(box["x"] + box["width"] * start, box["y"] + box["height"] / 2)
     tab.mouse.down()

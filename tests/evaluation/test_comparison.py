@@ -51,15 +51,18 @@ def test_a_result_that_does_not_know_its_log_is_not_compared():
 
 
 def test_settings_that_differ_are_named_with_both_values():
-    shared = {"frames.scale": 1.0, "svm.c": 1, "labels.road": [], "topics.truth": "/a"}
-    other = shared | {"frames.scale": 0.5, "labels.road": [3], "svm.c": 2}
+    files = {"a.onnx": {"size": 1, "digest": "d"}}
+    shared = {"frames.scale": 1.0, "svm.c": 1, "labels.road": [], "net.files": files}
+    more = {"a.onnx": {"size": 2, "digest": "d"}, "b.onnx": {"size": 3}}
+    other = shared | {"frames.scale": 0.5, "labels.road": [3], "svm.c": 2, "net.files": more}
     base, new = (
         a_side("base", [10, 20], settings=shared),
         a_side("new", [10, 20], settings=other),
     )
     found = compare([base, altered(new, truth=lambda checksums: checksums + 1)], SETTINGS)
     of_the_log = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
-    assert found.changed_settings == {"new": of_the_log | {"svm.c": (1, 2)}}
+    of_files = {"net.files.a.onnx.size": (1, 2), "net.files.b.onnx": (None, {"size": 3})}
+    assert found.changed_settings == {"new": of_the_log | of_files | {"svm.c": (1, 2)}}
     assert found.warnings == (
         "base and new were replayed with different settings (`frames.scale` 1 and 0.5, "
         "`labels.road` not given and 3): part of the change may be theirs",

@@ -171,7 +171,7 @@ def test_every_frame_is_accounted_for_alike_in_summary_terminal_and_report(run, 
     assert told.summary(run)["frames"] == kept | {"skipped": skipped}
     assert account["in log"] == account["evaluated"] + sum(skipped.values())
 
-    windows = f", in {-(-account['evaluated'] // 10)} windows"
+    windows = f", in {-(-account['evaluated'] // 10)} groups of 10"
     why = ", ".join(f"{count} {IN_WORDS.get(name, name)}" for name, count in skipped.items())
     sentence = (
         f"{account['evaluated']} of {account['in log']} frames were evaluated{{}}. Left out: {why}."

@@ -198,7 +198,7 @@ def test_the_metric_is_on_the_screen_of_replay(workshop):
     # Commands to copy are never broken.
     tables = workshop.done("replay").partition("\nnext ")[0]
     assert max(map(len, tables.splitlines())) <= 80
-    assert re.search(r"\ndifference .* BACC, pp\n", workshop.done("replay"))
+    assert re.search(r"\ndifference, points .* BACC\n", workshop.done("replay"))
 
 
 def test_the_metric_is_compared_by_its_direction(workshop):
@@ -206,7 +206,7 @@ def test_the_metric_is_compared_by_its_direction(workshop):
     final = [change for change in compared["changes"] if change["final"]]
     assert final
     assert all("BACC" in change["difference"] for change in final)
-    assert "Change of BACC, pp" in words_of(workshop.folder / "compared.pdf")
+    assert "Change of BACC, points" in words_of(workshop.folder / "compared.pdf")
     code, _, said = workshop.runs["fail"]
     assert code == 4, said
 

@@ -29,8 +29,8 @@ def with_error(percent: int, road: int = 50) -> dict[str, float]:
 
 def test_a_failure_is_noted_with_its_reason() -> None:
     missed = metrics.of(Counts(tp=1, tn=80, fp=0, fn=19))
-    assert tuple(notes({"net": missed}, None)) == ("net finds 5.0 % of the road.",)
-    wrong = tuple(notes({"net": with_error(30)}, None))
+    assert tuple(notes({"net": missed})) == ("net finds 5.0 % of the road.",)
+    wrong = tuple(notes({"net": with_error(30)}))
     assert wrong == ("net gets 30.0 % of the pixels wrong.",)
 
 

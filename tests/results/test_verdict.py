@@ -166,6 +166,15 @@ CASES = {
         "net: 2.0 % of the pixels are wrong (91 frames). It misses 4.0 % of the road and calls "
         "1.0 % of the rest road. There is no baseline: no labelled frame was used for training.",
     ),
+    "nothing is road above the best threshold": (
+        (
+            {"net": {"post": rates(0.4) | {"pooled_ERR": 0.4}}},
+            [],
+            {"net": AT | {"threshold": 1.0, "ERR": 0.2}},
+        ),
+        "net: 40.0 % of the pixels are wrong (91 frames). It misses 80.0 % of the road and calls "
+        "20.0 % of the rest road. There is no baseline: no labelled frame was used for training.",
+    ),
     "as good as another, as printed": (
         (drive(mine=0.0104, filtered=0.0101), []),
         "mine: 1.0 % of the pixels are wrong (91 frames). It misses 2.1 % of the road and calls "

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from roadeval.cli.screens.tables import show_table
-from roadeval.data import FILTERED
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Table
-from roadeval.results.sentences import without_filter
 from roadeval.results.verdict import describe_errors
 
 if TYPE_CHECKING:
@@ -61,10 +59,7 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
 
 
 def _why(frame: WorstFrame) -> str:
-    """Return which errors a frame has, and the notes on it; on the filter only of what has it."""
-    notes = frame.notes if frame.variant == FILTERED else without_filter(frame.notes)
-    # The title names the variant, and the first sentence says what it misses.
-    about = [note.removeprefix(f"{frame.variant} ") for note in notes]
-    about = [note for note in about if not note.startswith(("finds ", "gets "))]
+    """Return which errors a frame has, and the notes on it; the title names its variant."""
+    about = [note.removeprefix(f"{frame.variant} ") for note in frame.notes]
     clauses = [f"{describe_errors(frame.rates)}.", *about]
     return " ".join(clause[:1].upper() + clause[1:] for clause in clauses)

@@ -561,7 +561,16 @@ def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
     """Return both values of the settings that both know and that differ."""
     changed: dict[str, tuple[Any, Any]] = {}
     for base, new in pairs:
-        for name, value in base.settings.items():
-            if new.settings.get(name, value) != value:
-                changed.setdefault(name, (value, new.settings[name]))
+        for name in (name for name in base.settings if name in new.settings):
+            for part, values in _differences(name, base.settings[name], new.settings[name]):
+                changed.setdefault(part, values)
     return changed
+
+
+def _differences(name: str, value: Any, other: Any) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """Yield the name and both values of a setting that differs, in a table of each that does."""
+    if isinstance(value, Mapping) and isinstance(other, Mapping):
+        for key in {**value, **other}:
+            yield from _differences(f"{name}.{key}", value.get(key), other.get(key))
+    elif value != other:
+        yield name, (value, other)

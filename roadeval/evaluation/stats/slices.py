@@ -208,7 +208,7 @@ class _Search:
                     drives,
                 )
             )
-        return sorted(slices, key=lambda found: -found.ratio)
+        return sorted(slices, key=lambda failure: -failure.ratio)
 
     def _conditions(self) -> Iterator[tuple[Condition, Flags]]:
         """Yield conditions, and whether each frame meets them."""

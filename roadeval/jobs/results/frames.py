@@ -31,7 +31,7 @@ from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, fade
 from roadeval.report.sections.frames import SMALL, strip
 from roadeval.results.facts import focus_of
-from roadeval.results.sentences import notes
+from roadeval.results.sentences import notes as notes_on
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,13 +171,14 @@ class FramePicker:
         layers = [*self._layers(seen, frame)] if seen and change is None else []
         if (variant := variant or self._focus) is None or frame not in self._scored:
             assert seen is not None
-            images, notes = [LayerImage("camera", seen.image(frame))], seen.notes(frame)
-            return NotableFrame(frame, stamp_ns, "", {}, notes=notes, images=images, layers=layers)
+            images = [LayerImage("camera", seen.image(frame))]
+            return NotableFrame(frame, stamp_ns, "", {}, images=images, layers=layers)
         masks = only(self._finals, frame=frame).set_index("variant")
+        rates: dict[Any, Any] = masks[[*SHORT]].to_dict("index")
         return NotableFrame(
-            *(frame, stamp_ns, variant, dict[Any, Any](masks[[*SHORT]].to_dict("index"))),
+            *(frame, stamp_ns, variant, rates),
             change=change,
-            notes=result.notes(frame, variant),
+            notes=[*notes_on(rates, variant)],
             images=[*self._outcomes_of(seen, frame)] if seen else [],
             layers=layers,
         )
@@ -231,7 +232,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
     for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: rate for name, rate in rates.items() if name != BASELINE}
-        words, conditions = [*notes(others, blind)], [*_frame_conditions(focus, others, blind)]
+        words, conditions = [*notes_on(rates)], [*_frame_conditions(focus, others, blind)]
         yield NotableFrame(frame, stamp, focus, rates, notes=words, conditions=conditions)
 
 

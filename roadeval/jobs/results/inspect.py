@@ -14,10 +14,12 @@ from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.unlabelled import SIGNS, sign_of
 from roadeval.evaluation.tables import finals, only
 from roadeval.jobs.outputs import holding
+from roadeval.jobs.results.frames import rates_by_frame
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.results.fleet import FleetFolder, recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
+from roadeval.results.sentences import notes
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
@@ -42,7 +44,7 @@ class WorstFrame:
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of ERR by stage, see `roadeval.evaluation.tables.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()
-    """The recording's notes on it."""
+    """What a person should know of it beside its rates."""
     picture: str | None = None
     """In a fleet: the file of its errors."""
     recording: Path | None = None
@@ -102,21 +104,24 @@ def _ranked(
         return []
     apart = tables.scene_ns(rows["stamp_ns"])
     looked_at = masks if among is None else masks[masks["frame"].isin([*among])]
-    ranked = tables.worst(looked_at, count, by, apart).to_dict("records")
+    ranked = tables.worst(looked_at, count, by, apart)
     parts: dict[Any, Any] = {}
+    rates_of: dict[Any, Any] = {}
     if by == TESTED:
         parts = tables.causes(rows, focus).to_dict("index")
+        shown = finals(rows[rows["frame"].isin(ranked["frame"])])
+        rates_of = {frame: of_frame for frame, _, of_frame in rates_by_frame(shown, [*SHORT])}
     return [
         WorstFrame(
             *(rank, drive.name, row["frame"], row["stamp_ns"], focus, row["stage"]),
             rates={rate: row[rate] for rate in rates},
             by=by,
             parts=parts.get(row["frame"], {}),
-            notes=drive.notes(row["frame"], focus),
+            notes=tuple(notes(rates_of[row["frame"]], focus)) if by == TESTED else (),
             recording=drive.path if drive.recording else None,
             camera=drive.camera,
         )
-        for rank, row in enumerate(ranked, 1)
+        for rank, row in enumerate(records(ranked), 1)
     ]
 
 

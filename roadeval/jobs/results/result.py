@@ -241,14 +241,6 @@ class DriveResult:
         """The recording's own properties, about its origin; none of a folder."""
         return self.recording.layout.properties if self.recording else {}
 
-    def notes(self, frame: int, variant: str) -> tuple[str, ...]:
-        """Return the recording's notes on a frame, without those on other variants."""
-        if self.recording is None:
-            return ()
-        others = {layout.name for layout in self.recording.variants} - {variant}
-        notes = self.recording.notes(frame)
-        return tuple(note for note in notes if note.partition(" ")[0] not in others)
-
     @cached_property
     def _both(self) -> list[int]:
         """The frames in both tables, of frames and of regions."""

@@ -246,7 +246,7 @@ def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference
         f"ERR of {treated} minus {control}",
         ChartKind.LINES,
         [thin(series("each frame", look, pairs["frame"], 100 * pairs["change"]))],
-        unit="pp",
+        unit="points",
         level=Level(
             "mean" if mean.low is None else "mean and its interval",
             *map(in_percent, (mean.mean, mean.low, mean.high)),
@@ -270,7 +270,7 @@ def changes(finals: Sequence[MaskChange]) -> list[Chart]:
                 )
             ],
             names=[row.name for row in finals],
-            unit="pp",
+            unit="points",
         )
         for rate in SHORT
     ]
@@ -302,7 +302,7 @@ def forest(drives: pd.DataFrame, over: Difference, label: str) -> Figure:
     ]
     mean = [(over.mean, over.low, over.high)]
     shown.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], mean))
-    chart = Chart(label, ChartKind.MARKS, shown, [*names, MEAN], "pp", sums=1)
+    chart = Chart(label, ChartKind.MARKS, shown, [*names, MEAN], "points", sums=1)
     if (groups != "").any():
         sentences.append(caption("drives in groups"))
     if missing := ranked["low"].isna().sum():

@@ -132,7 +132,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
         )
     table = Table(
         [
-            *("final mask", "flicker, %", "the truth's, %", "beyond it, pp", "pairs"),
+            *("final mask", "flicker, %", "the truth's, %", "beyond it", "pairs"),
             *("n", "seconds", "longest", "share, %", "recovered", "median recovery"),
         ],
         rows,
@@ -204,7 +204,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         return
     table = Table(
         [
-            *("variant", "if there were a", "ERR as it is", "ERR then", "change, pp"),
+            *("variant", "if there were a", "ERR as it is", "ERR then", "change, points"),
             *(*(f"{name} then" for name in OTHERS), "frames"),
         ],
         [

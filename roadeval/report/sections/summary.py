@@ -58,7 +58,8 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
         yield LinkList([(title, f"#frame-{frame.frame}")], command)
     if findings.totals:
         yield rates_table(findings.facts)
-    yield Text(account(findings.facts.frames, findings.facts.windows), "note")
+    facts = findings.facts
+    yield Text(account(facts.frames, facts.windows, facts.evaluation.window), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
         legend = caption("thumbnails without truth")

@@ -56,7 +56,7 @@ function tipLine(name, value, mark = null) {
 /** A value with its interval, if it has one. */
 function withEnds(value, low, high, unit) {
   if (value === null || value === undefined) return "\u2013";
-  const written = (number) => `${unit === "pp" && number > 0 ? "+" : ""}${number.toFixed(2)}`.replace("-", "\u2212");
+  const written = (number) => `${unit === "points" && number > 0 ? "+" : ""}${number.toFixed(2)}`.replace("-", "\u2212");
   const hasEnds = typeof low === "number" && typeof high === "number";
   return `${written(value)} ${unit}` + (hasEnds ? ` (${written(low)} to ${written(high)})` : "");
 }
@@ -193,7 +193,7 @@ class ChartView {
     const lines = shown.map((series) => {
       const place = this.placeIn(series);
       const value = place < 0 ? null : series.y[place];
-      const isOmitted = value === null && shown.length > 1 && (unit === "pp" || !this.values.frames);
+      const isOmitted = value === null && shown.length > 1 && (unit === "points" || !this.values.frames);
       return isOmitted ? null : tipLine(series.name, withEnds(value, series.low?.[place], series.high?.[place], unit), this.markOf(series.name));
     });
     if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
