@@ -252,24 +252,27 @@ def describe_part(part: str) -> str:
     return f"in the {part} half of the image" if part in ("left", "right") else f"on {part}"
 
 
-def describe_slice(found: Slice) -> str:
+def describe_slice(failure: Slice) -> str:
     """Return where ERR is higher, and by how much, as a sentence.
 
     >>> shade = Condition("shadow", ">", 0.3)
     >>> describe_slice(Slice([shade], "20-80m", 90, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01))
     'In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest (1.8 to 4.9).'
     """
-    words = describe_place(found)
+    words = describe_place(failure)
     return (
-        f"{words[0].upper()}{words[1:]}, ERR is {found.ratio:.1f} times the rest "
-        f"({found.low:.1f} to {found.high:.1f})."
+        f"{words[0].upper()}{words[1:]}, ERR is {failure.ratio:.1f} times the rest "
+        f"({failure.low:.1f} to {failure.high:.1f})."
     )
 
 
-def describe_place(found: Slice) -> str:
+def describe_place(failure: Slice) -> str:
     """Return which frames, and which part of them, a slice is."""
-    conditions = " and ".join(map(describe_condition, found.conditions))
-    parts = [f"in frames {conditions}" * bool(conditions), found.part and describe_part(found.part)]
+    conditions = " and ".join(map(describe_condition, failure.conditions))
+    parts = [
+        f"in frames {conditions}" * bool(conditions),
+        failure.part and describe_part(failure.part),
+    ]
     return ", ".join(filter(None, parts))
 
 

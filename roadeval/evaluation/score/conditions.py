@@ -86,7 +86,9 @@ def parts_of(result: FrameResult) -> Iterator[tuple[str, str, int, int]]:
     for variant, errors in result.errors.items():
         halves = np.array_split(errors.array.astype(np.uint8, copy=False), 2, axis=1)
         for name, half in zip(("left", "right"), halves, strict=True):
-            wrong, ignored = ((half & bits == code).sum() for bits, code in ((6, FP), (4, IGNORED)))
+            wrong, ignored = (
+                np.count_nonzero(half & bits == code) for bits, code in ((6, FP), (4, IGNORED))
+            )
             yield variant, name, int(wrong), int(half.size - ignored)
 
 

@@ -172,6 +172,7 @@ class _Search:
         self._block = np.zeros(count, np.int64)
         if unit == "drives":
             self._block = table["group"].factorize()[0]
+            self._drive = table["drive"].factorize()[0]
             self.enough = len(np.unique(self._block)) >= 2 * LEAST_GROUPS
         elif count >= LEAST_FRAMES:
             wrong, pixels = counts[""].T
@@ -207,7 +208,7 @@ class _Search:
                     drives,
                 )
             )
-        return sorted(slices, key=lambda found: -found.ratio)
+        return sorted(slices, key=lambda failure: -failure.ratio)
 
     def _conditions(self) -> Iterator[tuple[Condition, Flags]]:
         """Yield conditions, and whether each frame meets them."""
@@ -259,7 +260,7 @@ class _Search:
         Both are 0 if the slice, or the rest, is too small, or errs less than the rest.
         """
         rows = self._searching
-        units = self._block if self._unit == "drives" else np.arange(len(rows)) * 40 // len(rows)
+        units = self._drive if self._unit == "drives" else np.arange(len(rows)) * 40 // len(rows)
         starts = np.flatnonzero(np.diff(units[rows], prepend=-1))
         flags, (wrong, pixels) = meets[:, rows], self._counts[part][rows].T
         errors, labelled = (np.add.reduceat(flags * c, starts, axis=1) for c in (wrong, pixels))
@@ -267,6 +268,10 @@ class _Search:
             np.add.reduceat(c, starts) - sums
             for c, sums in zip(self._counts[""][rows].T, (errors, labelled), strict=True)
         )
+        if self._unit == "drives":
+            errors, labelled, rest, rest_labelled = _within_drives(
+                errors, labelled, rest, rest_labelled
+            )
         common = (errors + rest).sum(axis=1) / (labelled + rest_labelled).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             series = (errors - common[:, None] * labelled) / labelled.sum(axis=1, keepdims=True)
@@ -283,11 +288,14 @@ class _Search:
         """Return wrong and labelled pixels inside and outside, by frame or group of a half."""
         inside = np.where(flags[rows, None], self._counts[part][rows], 0)
         outside = self._counts[""][rows] - inside
-        if self._unit == "drives":
-            order = np.argsort(self._block[rows], kind="stable")
-            starts = np.flatnonzero(np.diff(self._block[rows][order], prepend=-1))
-            inside, outside = (np.add.reduceat(s[order], starts) for s in (inside, outside))
-        return inside, outside
+        if self._unit == "frames":
+            return inside, outside
+        _, first, drive = np.unique(self._drive[rows], return_index=True, return_inverse=True)
+        sums: list[Floats] = [np.bincount(drive, c).astype(float) for c in (*inside.T, *outside.T)]
+        group = np.unique(self._block[rows][first], return_inverse=True)[1]
+        counts = np.array([np.bincount(group, column) for column in _within_drives(*sums)])
+        counts = counts[:, (counts[1] > 0) | (counts[3] > 0)].T
+        return counts[:, :2], counts[:, 2:]
 
     def _test(self, flags: Flags, part: str, rows: Flags) -> tuple[float, float]:
         """Return the p-value of a slice on a half, and its ratio; 1 and 1 if it is too small."""
@@ -338,6 +346,25 @@ class _Search:
         rows = rows.sort_values("error", ascending=False, kind="stable")
         rows = rows.drop_duplicates("scene")[:SHOWN]
         return rows["frame"].tolist(), rows["drive"].tolist() if of_drives else []
+
+
+def _within_drives(
+    wrong: Floats, pixels: Floats, rest: Floats, rest_pixels: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return wrong and labelled pixels inside and outside, ``(..., drives)``, weighted.
+
+    The weights are those of Mantel and Haenszel, so that each drive is compared with itself. What
+    no drive has both inside and outside, as a tag, is compared between drives, without weights.
+    """
+    both = pixels + rest_pixels
+    weights = pixels * rest_pixels / both
+    alone = weights.sum(axis=-1, keepdims=True) == 0
+    return (
+        np.where(alone, wrong, wrong * rest_pixels / both),
+        np.where(alone, pixels, weights),
+        np.where(alone, rest, rest * pixels / both),
+        np.where(alone, rest_pixels, weights),
+    )
 
 
 def _p_value(inside: Floats, outside: Floats, unit: Unit, ratio: float = 1.0) -> float:

@@ -36,18 +36,18 @@ def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[
         yield Text(caption(name, variant=facts.focus, unit=unit, least=least))
         return
     rows, links = [], dict[str, str]()
-    for found in slices:
-        yield Text(describe_slice(found))
-        frames = [str(frame) for frame in found.worst]
-        if found.drives:
-            pairs = zip(found.drives, frames, strict=True)
+    for failure in slices:
+        yield Text(describe_slice(failure))
+        frames = [str(frame) for frame in failure.worst]
+        if failure.drives:
+            pairs = zip(failure.drives, frames, strict=True)
             frames = [f"{names.get(drive, drive)} {frame}" for drive, frame in pairs]
         elif level == 1:
             links |= {f"Frame {frame}": f"#frame-{frame}" for frame in frames}
-        ratio = f"{found.ratio:.2f} ({found.low:.2f} to {found.high:.2f})"
-        rates = percent(found.inside), percent(found.outside)
-        place = describe_place(found)
-        rows.append([place, number(found.frames), *rates, ratio, ", ".join(frames)])
+        ratio = f"{failure.ratio:.1f} ({failure.low:.1f} to {failure.high:.1f})"
+        rates = percent(failure.inside), percent(failure.outside)
+        place = describe_place(failure)
+        rows.append([place, number(failure.frames), *rates, ratio, ", ".join(frames)])
     columns = ["where", "frames", "ERR, %", "elsewhere, %", "ratio", "worst frames"]
     yield Table(columns, rows, text_columns=(0, 5), small=True)
     yield note("slices", variant=facts.focus, unit=unit)

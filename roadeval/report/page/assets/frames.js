@@ -36,10 +36,10 @@ class Browser {
         this.show(Number(row.dataset.frame));
       });
     }
-    for (const link of document.querySelectorAll("a.frame")) {
+    for (const link of document.querySelectorAll('a[href^="#frame-"]:not(.frames a)')) {
       link.addEventListener("click", (event) => {
         event.preventDefault();
-        this.show(Number(link.textContent), { scroll: true });
+        this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
       });
     }
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));

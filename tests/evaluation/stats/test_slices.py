@@ -1,0 +1,87 @@
+"""Slices that are planted are found, and of errors by chance hardly one is named."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from benchmarks.slices import make_drive, make_fleet, names, plants, walk
+from roadeval.evaluation.score.conditions import QUANTITIES
+from roadeval.evaluation.stats.slices import Condition, find_slices
+
+
+def conditions(seed: int, frames: int = 400) -> pd.DataFrame:
+    """Conditions of a made-up drive, each with a memory of its own."""
+    rng = np.random.default_rng([9, seed])
+    memories = (2, 5, 10, 20, 40, 80, 160)
+    pairs = zip(QUANTITIES, memories, strict=True)
+    return pd.DataFrame({name: walk(rng, frames, memory) for name, memory in pairs})
+
+
+REALS = [conditions(seed) for seed in range(6)]
+PLANTS = {name: (what, plant) for name, what, plant in plants(3, REALS)}
+
+
+def test_at_most_one_of_twenty_null_drives_names_a_slice() -> None:
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng([1, seed])
+        frames, memory = (90, 190, 400)[seed % 3], (1, 5, 20, 50)[seed % 4]
+        found += bool(find_slices(*make_drive(rng, conditions(seed), frames, memory), 0.95))
+    assert found <= 1
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_a_planted_slice_is_found_with_its_ratio(kind: str) -> None:
+    what, plant = PLANTS[kind]
+    right = 0
+    for seed in range(6):
+        drive = make_drive(np.random.default_rng([3, seed]), conditions(seed), 600, 2, plant)
+        right += names(find_slices(*drive, 0.95), what)
+    assert right >= 4
+
+
+def test_numbers_are_of_the_confirming_half_and_the_worst_frames_are_apart() -> None:
+    drive = make_drive(np.random.default_rng(3), conditions(0), 600, 2, PLANTS["one"][1])
+    found = find_slices(*drive, 0.95)[0]
+    assert found.low <= 3 <= found.high
+    assert found.ratio == pytest.approx(found.inside / found.outside)
+    assert 1 < found.low < found.ratio < found.high
+    assert 50 < found.frames < 200
+    assert len(found.worst) == 3
+    assert min(np.diff(sorted(found.worst))) > 1
+
+
+def test_a_fleet_names_a_planted_slice_with_the_drives_of_its_worst_frames() -> None:
+    fleet = make_fleet(np.random.default_rng(5), REALS, 40, PLANTS["one"][1])
+    found = find_slices(*fleet, 0.95, over_drives=True)
+    assert names(found, "brightness")
+    assert len({*found[0].drives}) == 3
+
+
+def test_a_tag_is_compared_between_drives() -> None:
+    frames, of_frames, parts = make_fleet(np.random.default_rng(6), [conditions(0)], 40)
+    rain = (of_frames["tag_weather"] == "rain").to_numpy()
+    frames.loc[rain, "FP"] *= 4
+    found = find_slices(frames, of_frames, parts[:0], 0.95, over_drives=True)
+    assert [Condition("tag_weather", "is", "rain")] in [place.conditions for place in found]
+
+
+@pytest.mark.parametrize("frames", [0, 1, 39])
+def test_too_few_frames_name_nothing(frames: int) -> None:
+    rows = [table[table["frame"] < frames] for table in make_drive(*_FIRST)]
+    assert find_slices(*rows, 0.95) == []
+
+
+_FIRST = (np.random.default_rng(7), conditions(1), 90, 1, PLANTS["one"][1])
+
+
+def test_distances_are_united_from_near_to_far_and_replace_rows() -> None:
+    frames, of_frames, parts = make_drive(np.random.default_rng(8), conditions(2), 400, 2)
+    bands = {"part0": "0-10m", "part1": "10-20m", "part2": "20-40m", "part3": "band_0"}
+    parts["region"] = parts["region"].map(bands)
+    far = parts["region"].isin(["10-20m", "20-40m"]).to_numpy()
+    parts.loc[far, "wrong"] *= 3
+    frames["FP"] = parts.groupby("frame")["wrong"].sum().to_numpy()
+    found = {place.part for place in find_slices(frames, of_frames, parts, 0.95)}
+    assert "10-40m" in found
+    assert not any(part.startswith("rows") for part in found)

@@ -1,0 +1,57 @@
+"""When a mask fails: what a report says of slices that hold, of none, and of too few frames."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from roadeval.evaluation.stats.slices import Condition, Slice
+from roadeval.report.blocks import Heading, LinkList, Table, Text
+from roadeval.report.sections.slices import when_it_fails
+from roadeval.results.facts import Facts, FrameAccount
+from tests.report.making import plain_rows, some_findings, the
+from tests.results.making import facts_of
+
+SHADE = Slice(
+    *([Condition("shadow", ">", 0.3)], "20-80m", 45, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01, [12, 40])
+)
+
+
+def blocks(frames: int = 90, level: int = 1, **slices: list[Slice]):
+    account = FrameAccount(evaluated=frames)
+    return [*when_it_fails(some_findings(slices=slices, frames=account), level)]
+
+
+def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
+    section = blocks(filtered=[SHADE])
+    assert section[1].text == (
+        "In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest "
+        "(1.8 to 4.9)."
+    )
+    place = "in frames with more than 30 % shade, 20 to 80 m ahead"
+    row = [place, "45", "31.00", "10.00", "3.1 (1.8 to 4.9)", "12, 40"]
+    assert plain_rows(the(Table, section)) == [row]
+    assert the(LinkList, section).links == [("Frame 12", "#frame-12"), ("Frame 40", "#frame-40")]
+    assert not [b for b in blocks(level=2, filtered=[SHADE]) if isinstance(b, LinkList)]
+
+
+@pytest.mark.parametrize(
+    ("frames", "slices", "begin"),
+    [(90, {"filtered": []}, "Nothing that holds on the other half"), (39, {}, "Too little")],
+)
+def test_where_no_slice_holds_a_sentence_says_so(frames, slices, begin):
+    heading, sentence = blocks(frames, **slices)
+    assert isinstance(heading, Heading)
+    assert isinstance(sentence, Text)
+    assert sentence.text.startswith(begin)
+
+
+def test_a_result_in_which_nothing_was_searched_has_no_section():
+    assert blocks(90) == []
+
+
+@pytest.mark.parametrize("slices", [{}, {"mine": []}, {"mine": [SHADE, replace(SHADE, part="")]}])
+def test_slices_are_read_back_as_they_were_written(slices):
+    facts = Facts.parse(facts_of(slices=slices).text(), "here")
+    assert facts.slices == slices
+    assert ("slices" in json.loads(facts.text())) == bool(slices)
