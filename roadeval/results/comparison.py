@@ -84,6 +84,7 @@ def where(comparison: Comparison) -> list[str]:
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
     return [
         *(_by_region(comparison, *mask) for mask in masks if mask not in still),
+        *_by_class(comparison),
         *_disagreements(comparison),
         *changed_drives(comparison),
     ]
@@ -101,6 +102,17 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
             parts.append(f"{word} ({'; '.join(names)})")
     changes = ", ".join(parts) or why_unsure(row.difference for row in rows)
     return f"{_mask_name(result, variant)} by region: {changes}"
+
+
+def _by_class(comparison: Comparison) -> Iterator[str]:
+    base = comparison.results[0].label
+    for mask, rows in groupby(comparison.classes, lambda row: (row.result, row.variant)):
+        parts = [
+            f"{percent(row.new, 0)} % {row.name} ({percent(row.base, 0)} % in {base})"
+            for row in rows
+            if max(row.new, row.base) >= 0.1
+        ]
+        yield f"{_mask_name(*mask)}: the false road is {', '.join(parts)}"
 
 
 def why_unsure(differences: Iterable[Difference]) -> str:

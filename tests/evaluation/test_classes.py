@@ -12,6 +12,7 @@ from roadeval.evaluation.comparison.compare import compare
 from roadeval.evaluation.score.classes import BESIDE, ClassSums, count_classes
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import by_class
+from roadeval.results.comparison import where
 from roadeval.results.sentences import describe_classes
 from tests.evaluation.making import a_drive, a_result, table_of
 
@@ -127,8 +128,10 @@ def test_classes_are_compared_by_their_share_even_if_one_result_lacks_their_name
             ("same", parts[0], ("", "", "")),
         )
     )
-    changes = compare([base, new, same], EvaluationSettings()).classes
-    assert [tuple(change) for change in changes] == [
+    comparison = compare([base, new, same], EvaluationSettings())
+    said = "filtered of new: the false road is 100 % verge (75 % in base), 0 % car (25 % in base)"
+    assert said in where(comparison)
+    assert [tuple(change) for change in comparison.classes] == [
         ("new", "filtered", "verge", 0.75, 1.0),
         ("new", "filtered", "car", 0.25, 0.0),
     ]

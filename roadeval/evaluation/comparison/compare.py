@@ -370,8 +370,8 @@ def _class_changes(label: str, base: pd.DataFrame, new: pd.DataFrame) -> Iterato
     """Yield the shares of the false road that are at least a hundredth; one may lack the names."""
     texts = [*map(str, concatenate([base, new])["name"])]
     values = [*base["class"], *new["class"]]
-    known = {value: text for value, text in zip(values, texts, strict=True) if text}
-    names = [text or known.get(value, "") for value, text in zip(values, texts, strict=True)]
+    named = {value: text for value, text in zip(values, texts, strict=True) if text}
+    names = [text or named.get(value, "") for value, text in zip(values, texts, strict=True)]
     base, new = base.assign(name=names[: len(base)]), new.assign(name=names[len(base) :])
     for variant in [name for name in values_of(new, "variant") if name != BASELINE]:
         sides = (by_class(only(rows, variant=variant)) for rows in (base, new))

@@ -62,6 +62,7 @@ from roadeval.logs.truth.pairing import (
     frames_of,
 )
 from roadeval.runtime.sentence import Sentence
+from roadeval.runtime.text import elide
 
 UNKNOWN: Final = 254
 """Stands for the truth of a value with unknown meaning."""
@@ -79,6 +80,8 @@ TWO_KINDS: Final = Sentence(
 NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
 )
+LONG: Final = 80
+"""Most letters of a class's name in results."""
 RARE: Final = 0.05
 """A smaller share of the labelled pixels is hardly the road before a vehicle."""
 
@@ -121,7 +124,7 @@ class ClassMap:
         for value in self.codes:
             truth = self.meaning.get(value, IGNORE if value < 0 else self.others)
             name = self.names.get(value, _color_name(value) if self.by_color else "")
-            classes.append(TruthClass(value, name, words[truth]))
+            classes.append(TruthClass(value, elide(name, LONG), words[truth]))
         return classes
 
     @cached_property

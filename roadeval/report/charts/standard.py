@@ -162,14 +162,24 @@ def stages(totals: Totals) -> list[Chart]:
     ]
 
 
-_OF_REGIONS: Final = ("ERR within the region", "Share of the wrong pixels")
+_OF_REGIONS: Final = {TESTED: "ERR within the region", "errors": "Share of the wrong pixels"}
+OF_CLASSES: Final = {
+    "false": "Share of the false road",
+    "missed": "Share of the missed road beside it",
+}
 
 
-def regions(rates: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, str]) -> list[Chart]:
+def regions(
+    rates: pd.DataFrame,
+    variants: Sequence[str],
+    titles: Mapping[str, str],
+    shown: Mapping[str, str] = _OF_REGIONS,
+) -> list[Chart]:
     """Return the error rate in each region, and its shares of the errors and of the pixels.
 
-    ``rates`` are those of `roadeval.evaluation.tables.by_region`. The charts show the ``variants``
-    and the regions of ``titles``, from top to bottom.
+    ``rates`` are those of `roadeval.evaluation.tables.by_region`, of which columns are ``shown``
+    with their titles. The charts show the ``variants`` and the regions of ``titles``, from top to
+    bottom.
     """
     names, rates = rates.index.get_level_values("variant"), 100 * rates.droplevel("variant")
     percents = {variant: rates[names == variant].reindex([*titles]) for variant in variants}
@@ -182,9 +192,9 @@ def regions(rates: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
                 for variant, look in looks(variants).items()
             ],
             names=[*titles.values()],
-            share=percents[variants[0]]["pixels"].tolist() if rate == "errors" else (),
+            share=percents[variants[0]]["pixels"].tolist() if rate in ("errors", "false") else (),
         )
-        for rate, title in zip((TESTED, "errors"), _OF_REGIONS, strict=True)
+        for rate, title in shown.items()
     ]
 
 

@@ -9,8 +9,7 @@ from roadeval.data.words import percent
 from roadeval.evaluation.tables import by_class, only
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, Table, Text
 from roadeval.report.captions import caption
-from roadeval.report.chart import Chart, ChartKind, looks
-from roadeval.report.charts.standard import series
+from roadeval.report.charts.standard import OF_CLASSES, regions
 from roadeval.report.findings import Findings
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import describe_classes
@@ -23,36 +22,22 @@ LEAST: Final = 0.005
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     """Yield the part of each class in the errors; nothing without classes."""
+    import pandas as pd
+
     rows, focus = findings.table("classes"), findings.facts.focus
-    of_focus = by_class(only(rows, variant=focus))
-    if not len(of_focus):
+    names = [name for name in findings.finals if name in {*rows["variant"]}]
+    if focus not in names:
         return
+    by_variant = {name: by_class(only(rows, variant=name)) for name in names}
+    of_focus, parts = by_variant[focus], pd.concat(by_variant, names=["variant"])
     yield Heading("Which class is the false road")
-    if sentence := " ".join(describe_classes(rows, str(focus)).values()):
+    if sentence := " ".join(describe_classes(rows, focus).values()):
         yield Text(f"{focus}: {sentence}")
     is_other = of_focus["truth"] == "other"
-    is_wrong = is_other & (of_focus[["false", "missed"]].max(axis=1) >= LEAST)
-    shown = of_focus[is_wrong].head(MOST)
-    names = [name for name in findings.finals if name in {*rows["variant"]}]
-    parts = {name: by_class(only(rows, variant=name)).reindex(shown.index) for name in names}
-    charts = [
-        Chart(
-            title,
-            ChartKind.MARKS,
-            [
-                series(name, look, range(len(shown)), 100 * parts[name][column])
-                for name, look in looks(names).items()
-            ],
-            names=[*shown.index],
-            share=(100 * shown["of_other"]).tolist() if column == "false" else (),
-        )
-        for column, title in (
-            ("false", "Share of the false road"),
-            ("missed", "Share of the missed road beside it"),
-        )
-    ]
-    if len(shown):
-        yield Figure(charts, caption("classes"))
+    is_wrong = is_other & (of_focus[[*OF_CLASSES]].max(axis=1) >= LEAST)
+    if titles := {name: name for name in of_focus.index[is_wrong][:MOST]}:
+        shares = parts[[*OF_CLASSES]].assign(pixels=parts["of_other"])
+        yield Figure(regions(shares, names, titles, OF_CLASSES), caption("classes"))
     columns: dict[str, list[Cell | str]] = {
         "class": [*of_focus.index],
         "truth": [*of_focus["truth"]],

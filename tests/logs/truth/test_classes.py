@@ -1,5 +1,7 @@
 """The classes of the truth: every label format that has them keeps them, and their names."""
 
+import json
+
 import cv2
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from roadeval.logs.settings import FrameSettings, LabelSettings, LogConfig, Mask
 from roadeval.logs.truth.meaning import count_values, find_meaning, meaning_of
 from tests.logs.making import COMPRESSED, HEADER, IMAGE, compressed, grey, header, jpeg, png, raw
 from tests.logs.truth.test_folder import opened
-from tests.logs.truth.test_formats import FOREIGN, LABELS, SIZE
+from tests.logs.truth.test_formats import FOREIGN, LABELS, POINTS, SIZE, painted
 
 LIMITS = Limits()
 LABEL_INFO = HEADER.format(
@@ -47,6 +49,53 @@ def test_classes_of_drawn_labels_are_those_of_scikit_image(path):
         label = meaning.read(labels.picture(place), LIMITS)
         expected = np.where(FOREIGN[path][number] == "", "no shape", FOREIGN[path][number])
         np.testing.assert_array_equal(names_in(label, meaning), expected)
+
+
+RINGS = {name: [[*point] for point in POINTS[name]] for name in ("road", "car")}
+DOCUMENTS = {
+    "Cityscapes": {
+        "imgWidth": SIZE[0],
+        "imgHeight": SIZE[1],
+        "objects": [{"label": name, "polygon": ring} for name, ring in RINGS.items()],
+    },
+    "Scalabel": [
+        {
+            "name": "frame_0000.jpg",
+            "labels": [
+                {"category": name, "poly2d": [{"vertices": ring, "closed": True}]}
+                for name, ring in RINGS.items()
+            ],
+        }
+    ],
+    "VIA": {
+        "frame_0000.jpg": {
+            "filename": "frame_0000.jpg",
+            "regions": [
+                {
+                    "region_attributes": {"class": name},
+                    "shape_attributes": {
+                        "name": "polygon",
+                        "all_points_x": [x for x, _ in ring],
+                        "all_points_y": [y for _, y in ring],
+                    },
+                }
+                for name, ring in RINGS.items()
+            ],
+        }
+    },
+}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_classes_of_documents_are_those_of_scikit_image(document, tmp_path):
+    path = tmp_path / "frame_0000_gtFine_polygons.json"
+    path.write_text(json.dumps(DOCUMENTS[document]))
+    labels = opened(path, SIZE)
+    meaning = meaning_of(labels, MaskSettings(labels=LabelSettings(road=("road",))))
+    label = meaning.read(labels.picture(0), LIMITS)
+    expected = painted("road", "car")
+    expected[expected == ""] = "no shape"
+    np.testing.assert_array_equal(names_in(label, meaning), expected)
 
 
 @pytest.mark.parametrize("encoding", ["8UC1", "16UC1", "8SC1", "16SC1", "32SC1"])
