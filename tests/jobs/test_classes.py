@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pandas as pd
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -43,10 +44,12 @@ def test_classes_of_a_drive_of_ids_are_those_of_a_plain_judge(drive: Path, tmp_p
             pixels[:] += np.bincount(labels.ravel(), minlength=256)
             road[:] += np.bincount(labels[mask == 1], minlength=256)
 
-    config = settings(road=[3], ignore=[11], max_frames=13, train_frames=8, record="none")
+    config = settings(road=[3], ignore=[11], max_frames=13, train_frames=8, record="worst:1")
     config = config.override({"only": ["unfiltered"], "labels": {"names": {"4": "pavement"}}})
-    replay(drive, config, reports=tmp_path / "reports", on_frame=judge)
-    rows = Result(tmp_path / "reports").table("classes")
+    to = {"save": tmp_path / "out.rrd", "reports": tmp_path / "reports"}
+    replay(drive, config, **to, on_frame=judge)
+    rows = Result(to["reports"]).table("classes")
+    pd.testing.assert_frame_equal(Result(to["save"]).table("classes"), rows)
     of_variant = rows[rows["variant"] == "unfiltered"]
     assert of_variant["class"].tolist() == np.flatnonzero(pixels).tolist()
     assert of_variant["pixels"].tolist() == pixels[pixels > 0].tolist()

@@ -17,7 +17,7 @@ from roadeval.results.folder import ResultsFolder
 from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
-TABLES = tuple(name for name in schema.OF_A_DRIVE if name not in ("probabilities", "classes"))
+TABLES = tuple(n for n in schema.OF_A_DRIVE if n not in ("probabilities", "classes"))
 """Those of runs in which nothing says how probable road is."""
 
 
