@@ -7,12 +7,12 @@ drive whose errors change slowly is cut into two.
 
 A drive's frames resemble each other, and so do their conditions. The difference of ERR inside and
 outside is a weighted sum of the frames' ERR, whose variance `mean_distribution` computes for these
-weights. Pixels of one frame are compared as pairs. In a part of the image under a condition, ERR
-must also be higher than in the same part without the condition, and than beside the part. Groups of
-drives are independent: their contributions to the difference are tested by sign flips [1]_.
-
-All this at a ratio of ERR inside to outside: errors inside are divided by it. The interval has the
-ratios that are not rejected.
+weights; pixels of one frame are compared as pairs. The errors that it models are halfway between
+those as they are and those without the difference: as they are, a real difference looks like slow
+errors; without it, slow errors look less slow. In a part of the image under a condition, ERR must
+also be higher than in the part without the condition, and than beside the part. Groups of drives
+are independent: the contributions to a ratio of ERR inside to outside are tested by sign flips
+[1]_. An interval has the ratios that are not rejected.
 
 References
 ----------
