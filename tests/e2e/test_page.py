@@ -23,6 +23,7 @@ from roadeval.logs.writing.writer import LogWriter
 from roadeval.report.images import LayerImage, paint
 from tests.e2e.commands import DEMO, here, roadeval
 from tests.fixtures.browser import missing, violations, wait_until
+from tests.jobs.test_classes import write_ids
 from tests.networks.making import red_network
 from tests.results.fleet.making import fleet_of
 
@@ -279,6 +280,25 @@ def test_a_part_of_the_drive_narrows_tables_charts_and_the_verdict(table, demo, 
     tab.locator(".whole:visible").first.click()
     assert tab.locator(".verdict").inner_text() == whole
     assert "range" not in address(tab)
+
+
+def test_why_follows_the_focus_and_leads_to_its_frames(tmp_path, watched):
+    write_ids(tmp_path / "ids.mcap", 16)
+    (tmp_path / "names.toml").write_text('[labels.names]\n3 = "road"\n4 = "verge"\n8 = "car"\n')
+    truth = ["--config", "names.toml", "--road-label", "road", "--train-frames", "4"]
+    run = here("replay", "ids.mcap", *truth, "--save", "ids.rrd", cwd=tmp_path)
+    assert "Why filtered errs:\n- " in run.stdout, run.stderr
+    assert here("report", "ids.rrd", "-o", "page.html", cwd=tmp_path).returncode == 0
+    tab = watched((tmp_path / "page.html").as_uri()).tab
+    for focus in ("filtered", "unfiltered"):
+        tab.select_option("[name=focus]", focus)
+        assert shown(tab, ".list.plain h4")[0] == f"Why {focus} errs"
+        (first, *_) = shown(tab, f"[data-focus={focus}] li")
+        assert re.match(r"\d+ % of the false road is (verge|car)", first)
+    link = tab.locator("[data-focus=unfiltered] a").first
+    link.click()
+    assert frame(tab) == int(link.inner_text())
+    assert address(tab).endswith(f"#frame-{frame(tab)}&focus=unfiltered")
 
 
 def test_a_part_may_be_dragged_over_the_edge_of_a_chart(tab):

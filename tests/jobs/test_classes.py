@@ -71,6 +71,19 @@ def test_a_drive_of_plain_masks_has_no_table_of_classes(drive: Path, tmp_path):
     assert Result(tmp_path / "reports").table("classes").empty
 
 
+def write_ids(path: Path, width: int) -> None:
+    """Write a drive with the ids of road (3), verge (4) and car (8), of so many columns."""
+    with LogWriter(path) as writer:
+        for number in range(14):
+            made, stamp = frame(number + width), (number + 1) * NS
+            labels = np.where(made.truth == 1, 3, 4).astype(np.uint8)
+            labels[:12, :width] = 8
+            made.image[8:12] = made.image[20:]  # the verge's last rows look like road
+            _, png = cv2.imencode(".png", made.image[..., ::-1])
+            writer.image("/camera/image", stamp, png.tobytes(), "png")
+            writer.mask("/labels", stamp, labels)
+
+
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory):
     """A fleet of two drives whose verge is of two classes, the second one rarer in drive b."""
@@ -78,15 +91,7 @@ def fleet(tmp_path_factory):
     logs = folder / "logs"
     logs.mkdir()
     for name, width in (("a", 16), ("b", 4)):
-        with LogWriter(logs / f"{name}.mcap") as writer:
-            for number in range(14):
-                made, stamp = frame(number + width), (number + 1) * NS
-                labels = np.where(made.truth == 1, 3, 4).astype(np.uint8)
-                labels[:12, :width] = 8
-                made.image[8:12] = made.image[20:]  # the verge's last rows look like road
-                _, png = cv2.imencode(".png", made.image[..., ::-1])
-                writer.image("/camera/image", stamp, png.tobytes(), "png")
-                writer.mask("/labels", stamp, labels)
+        write_ids(logs / f"{name}.mcap", width)
     config = settings(road=["road"], train_frames=4, only=["unfiltered"])
     config = config.override({"labels": {"names": {"3": "road", "4": "verge", "8": "car"}}})
     replay_fleet([logs], folder / "f", config, executor=Here())
