@@ -249,7 +249,7 @@ def describe_part(part: str) -> str:
         return f"{match[1]} to {match[2]} m ahead"
     if match := re.fullmatch(r"rows_(\d+)-(\d+)", part):
         return f"{match[1]} to {match[2]} % down the image"
-    return f"in the {part} half of the image" if part in ("left", "right") else f"on {part}"
+    return f"in the {part} half of the image" if part in ("left", "right") else part
 
 
 def describe_slice(failure: Slice) -> str:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import Role
+from roadeval.data import Role, TruthClass
 from roadeval.evaluation.score.conditions import QUANTITIES, blur, curvature
 from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
@@ -48,6 +48,22 @@ def test_each_part_of_a_frame_has_its_wrong_and_labelled_pixels() -> None:
     assert parts.loc["left"].tolist() == [0, 2, 6]
     assert parts.loc["right"].tolist() == [0, 0, 8]
     assert parts.loc["band_0"].tolist() == [0, 2, 8]
+
+
+def test_each_class_but_the_ignored_one_is_a_part() -> None:
+    board = Scoreboard(("street", "/camera"), EvaluationSettings(bands=2), ["filtered"], None)
+    codes = np.where(TRUTH == 0, np.arange(4) % 2, np.where(TRUTH == 1, 2, 3)).astype(np.uint8)
+    frame = replace(a_frame(TRUTH, 0), classes=codes)
+    board.add(board.score(frame, Role.EVALUATED, (a_variant("filtered", {"post": MASK}),)))
+    classes = [
+        TruthClass(5, "verge", "other"),
+        TruthClass(6, "", "other"),
+        TruthClass(7, "road", "road"),
+        TruthClass(8, "void", "ignored"),
+    ]
+    parts = board.conditions.parts("filtered", classes).set_index("region")
+    rows = {name: parts.loc[name].tolist() for name in parts.index if name.startswith("on ")}
+    assert rows == {"on verge": [0, 1, 2], "on class 6": [0, 1, 2], "on road": [0, 0, 10]}
 
 
 def test_a_scoreboard_without_frames_has_no_conditions() -> None:

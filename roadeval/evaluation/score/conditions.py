@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from array import array
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from roadeval.data import ROAD, FrameResult, Rgb, Truth
+from roadeval.data import NO_CLASS, ROAD, FrameResult, Rgb, Truth, TruthClass
 from roadeval.data.arrays import FP, IGNORED, Plane
+from roadeval.evaluation.stats.slices import ON_CLASS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,6 +99,7 @@ class FrameConditions:
     def __init__(self) -> None:
         self._moments, self._values = array("q"), array("d")
         self._parts: defaultdict[tuple[str, str], array[int]] = defaultdict(lambda: array("q"))
+        self._classes: defaultdict[tuple[str, int], array[int]] = defaultdict(lambda: array("q"))
         self._before: Plane | None = None
 
     def add(self, result: FrameResult) -> None:
@@ -125,6 +127,10 @@ class FrameConditions:
         self._values.extend(round(values[name], DIGITS) for name in QUANTITIES)
         for variant, name, wrong, pixels in parts_of(result):
             self._parts[variant, name].extend((result.frame.number, wrong, pixels))
+        for variant, by_class in result.classes.items():
+            for code in np.flatnonzero(by_class[:NO_CLASS, 0]).tolist():
+                pixels, road, _ = by_class[code].tolist()
+                self._classes[variant, code].extend((result.frame.number, road, pixels))
 
     def interrupt(self) -> None:
         """Note that the next frame does not follow the one before."""
@@ -144,8 +150,11 @@ class FrameConditions:
         table[[*QUANTITIES]] = np.array(self._values).reshape(-1, len(QUANTITIES))
         return table
 
-    def parts(self, variant: str) -> pd.DataFrame:
-        """Return for each part of each frame the wrong and all labelled pixels of a final mask."""
+    def parts(self, variant: str, classes: Sequence[TruthClass] = ()) -> pd.DataFrame:
+        """Return for each part of each frame the wrong and all labelled pixels of a final mask.
+
+        ``classes`` are those of the truth, in the order of codes; each is a part, ``on <name>``.
+        """
         import pandas as pd
 
         columns = ["frame", "wrong", "N"]
@@ -154,4 +163,12 @@ class FrameConditions:
             for (of, name), rows in self._parts.items()
             if of == variant
         ]
+        for code, label in enumerate(classes):
+            rows = np.reshape(self._classes.get((variant, code), ()), (-1, 3))
+            if label.truth != "ignored" and len(rows):
+                part = pd.DataFrame(rows, columns=columns, dtype=np.int64)
+                if label.truth == "road":
+                    part["wrong"] = part["N"] - part["wrong"]
+                name = label.name or f"class {label.value}"
+                tables.append(part.assign(region=f"{ON_CLASS}{name}"))
         return pd.concat(tables) if tables else pd.DataFrame(columns=[*columns, "region"])

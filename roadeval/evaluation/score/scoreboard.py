@@ -33,6 +33,7 @@ from roadeval.data import (
     FrameResult,
     Role,
     Transition,
+    TruthClass,
     VariantResult,
     as_tree,
 )
@@ -339,8 +340,8 @@ class Scoreboard:
         """
         return self.curves.at_best_of(self._training)
 
-    def summary(self) -> DriveSums:
-        """Sum up the drive."""
+    def summary(self, classes: Sequence[TruthClass] = ()) -> DriveSums:
+        """Sum up the drive; ``classes`` are those of its truth, in the order of codes."""
         settings, frames = self._settings, self.frames()
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
         curves, beyond = self.curves.totals(), self._edges.totals()
@@ -364,17 +365,19 @@ class Scoreboard:
             "claims": evidence(windows, settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
-            "slices": self._slices(frames),
+            "slices": self._slices(frames, classes if any(self.classes.rows(classes)) else ()),
         }
         return DriveSums(frames, windows, drive_effects(frames, settings), parts, disturbed)
 
-    def _slices(self, frames: pd.DataFrame) -> dict[str, list[Slice]]:
+    def _slices(
+        self, frames: pd.DataFrame, classes: Sequence[TruthClass]
+    ) -> dict[str, list[Slice]]:
         """Return the slices of each final mask; nothing if there are too few frames."""
         key, confidence = dict(zip(KEY, self._key, strict=True)), self._settings.confidence
         conditions = self.conditions.table().assign(**key)
         return {
             variant: find_slices(
-                rows, conditions, self.conditions.parts(variant).assign(**key), confidence
+                rows, conditions, self.conditions.parts(variant, classes).assign(**key), confidence
             )
             for (variant,), rows in tables.group_rows(tables.finals(frames), ["variant"])
             if variant != BASELINE and len(rows) >= LEAST_FRAMES

@@ -63,6 +63,8 @@ TESTED_SLICES: Final = 2
 OVERLAP: Final = 0.5
 """Greatest share of common frames of two slices that are tested."""
 SHOWN: Final = 3
+ON_CLASS: Final = "on "
+"""Prefix of a part that is a class of the truth."""
 SCENES: Final = 30
 """Stretches of a drive of which each has at most one of the frames that are shown."""
 
@@ -87,7 +89,7 @@ class Slice:
     conditions: list[Condition]
     part: str
     """The part of the image: ``20-80m`` ahead, ``rows_40-60`` in percent from the top, ``left``,
-    ``right``, or another region; empty for whole frames."""
+    ``right``, ``on <class>`` of the truth; empty for whole frames."""
     frames: int
     inside: float
     outside: float
@@ -238,7 +240,8 @@ class _Search:
         for part in [*self._counts][1:]:
             both, both_ratios = self._score(meets, part)
             better = both_ratios >= GAIN * np.maximum(ratios, both_ratios[0])
-            places = [0, *np.flatnonzero(better).tolist()]
+            places = np.flatnonzero(better).tolist()
+            places += [0] * (not part.startswith(ON_CLASS))  # the table of classes tells it
             of_parts += [(both[place], part, (place,)) for place in places]
         for candidates in (of_frames, of_parts):
             taken: list[tuple[Flags, str]] = []

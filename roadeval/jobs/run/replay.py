@@ -167,7 +167,7 @@ class _CameraResult:
 
 def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _CameraResult:
     """Sum up a camera's run, and add the sums to the tables."""
-    sums = run.board.summary()
+    sums = run.board.summary(run.selection.classes)
     lines = csv_lines(run.key, sum_rows(run.board, sums.windows, run.selection.classes))
     results.append(lines)
     shown = [example.frame for example in examples]

@@ -85,3 +85,15 @@ def test_distances_are_united_from_near_to_far_and_replace_rows() -> None:
     found = {place.part for place in find_slices(frames, of_frames, parts, 0.95)}
     assert "10-40m" in found
     assert not any(part.startswith("rows") for part in found)
+
+
+def test_a_class_is_named_under_a_condition_and_never_alone() -> None:
+    frames, of_frames, parts = make_drive(
+        np.random.default_rng(9), conditions(0), 600, 2, PLANTS["part"][1]
+    )
+    parts["region"] = parts["region"].replace("part0", "on car")
+    found = [place for place in find_slices(frames, of_frames, parts, 0.95) if place.part]
+    assert "on car" in {place.part for place in found}
+    assert all(place.conditions for place in found if place.part == "on car")
+    parts.loc[parts["region"] == "on car", "wrong"] = 100
+    assert all(place.conditions for place in find_slices(frames, of_frames, parts, 0.95))
