@@ -106,7 +106,9 @@ def make_fleet(
     return frames, conditions, parts
 
 
-def plants(effect: float, reals: Sequence[pd.DataFrame]) -> Iterator[tuple[str, str, Plant]]:
+def plants(
+    effect: float, reals: Sequence[pd.DataFrame], first: str = "brightness", other: str = "change"
+) -> Iterator[tuple[str, str, Plant]]:
     """Yield the kinds of planted effects: a name, the quantity, and the factors."""
     of_all = pd.concat(reals)
 
@@ -114,19 +116,19 @@ def plants(effect: float, reals: Sequence[pd.DataFrame]) -> Iterator[tuple[str, 
         return (frames[name] > of_all[name].quantile(1 - share)).to_numpy()
 
     def one(frames: pd.DataFrame, error: Values) -> Values:
-        factor = np.where(inside(frames, "brightness", 0.4), effect, 1)
+        factor = np.where(inside(frames, first, 0.4), effect, 1)
         return np.array([factor, np.ones_like(error)])
 
     def two(frames: pd.DataFrame, error: Values) -> Values:
-        both = inside(frames, "brightness", 0.6) & inside(frames, "change", 0.6)
+        both = inside(frames, first, 0.6) & inside(frames, other, 0.6)
         return np.array([np.where(both, effect, 1), np.ones_like(error)])
 
     def part(frames: pd.DataFrame, error: Values) -> Values:
-        factor = np.where(inside(frames, "brightness", 0.4), effect, 1)
+        factor = np.where(inside(frames, first, 0.4), effect, 1)
         return np.array([np.ones_like(error), factor])
 
-    yield "one", "brightness", one
-    yield "two", "brightness", two
+    yield "one", first, one
+    yield "two", first, two
     yield "part", "part0", part
 
 
