@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
 from roadeval.data.words import counted, interval, number, percent
-from roadeval.evaluation.score.degradation import Degradations
 from roadeval.evaluation.score.fit import TRUTH, Finding, Misfit
 from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY
 from roadeval.evaluation.stats.difference import Difference
-from roadeval.evaluation.stats.slices import Condition, Slice
-from roadeval.evaluation.tables import by_class, only
 from roadeval.results.facts import FrameAccount
-from roadeval.results.schema import TAG
 from roadeval.runtime.sentence import Sentence
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FINE: Final = 0.005
 """Levels that differ by less have two digits."""
@@ -30,13 +22,6 @@ MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
 """Least difference between errors and stated errors that `describe_overconfidence` reports."""
-_TIMES: Final = {
-    1000.0: ("raises", ""),
-    3.5: ("multiplies", " by {:.0f}"),
-    2.5: ("triples", ""),
-    1.75: ("doubles", ""),
-}
-"""Words for a rise, by the least ratio."""
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
@@ -103,29 +88,6 @@ def correction(differences: Iterable[Difference]) -> str:
     )
 
 
-def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
-    """Return which disturbance harms the focus most, and how many do; empty without any.
-
-    A variant that was not disturbed gives way to the first one that was.
-    """
-    if not disturbances:
-        return ""
-    variant = focus if focus in disturbances else next(iter(disturbances))
-    changes = [c for c in disturbances[variant].values() if c.difference.mean > 0]
-    if not changes:
-        return f"No disturbance makes {variant} worse."
-    worst = max(changes, key=lambda change: change.difference.mean)
-    base, error = worst.base_ERR or 0.0, worst.ERR or 0.0
-    times = error / base if base else math.inf
-    does, by = next((words for least, words in _TIMES.items() if times >= least), ("raises", ""))
-    ends = f"{percent(base, 1)} to {percent(error, 1)} %"
-    sure = sum(is_significant(change.difference) for change in changes)
-    makes = "makes" if sure == 1 else "make"
-    more = f" {sure} of {len(disturbances[variant])} {makes} it worse beyond chance."
-    most = f"{worst.text} {does} the ERR of {variant}{by.format(times)}: {ends}."
-    return f"{most}{more * bool(sure)}"
-
-
 def misfit(finding: Finding, period_ms: float | None, remedy: str) -> str:
     """Return two sentences: what does not fit, and what to do.
 
@@ -174,106 +136,6 @@ def describe_overconfidence(curves: Mapping[str, Mapping[str, Mapping[str, Any]]
                 f"{variant} is over-confident: by its probabilities {percent(stated, 1)} % of the "
                 f"pixels are wrong, and {percent(wrong, 1)} % are."
             )
-
-
-NAMED: Final = 3
-"""Most classes that a sentence names."""
-LEAST_WRONG: Final = 0.001
-"""Less false road, or missed road, than this share of the pixels makes no sentence."""
-
-
-def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
-    """Return which classes the false road of a variant is, and which lie beside its missed road.
-
-    The sentences have the names ``false`` and ``missed``; rare errors have none. ``classes`` are
-    the rows of the table of that name, of any number of drives.
-    """
-    rows = only(classes, variant=variant)
-    pixels, is_road = rows["pixels"], rows["truth"] == "road"
-    is_other, drives = rows["truth"] == "other", rows["drive"].nunique()
-    least = max(1, LEAST_WRONG * pixels[is_road | is_other].sum())
-    over = f" (mean of {drives} drives)" if drives > 1 else ""
-    sentences = {}
-    for kind, wrong, verb, beside in (
-        ("false", rows["road"][is_other], "is", ""),
-        ("missed", (pixels - rows["road"])[is_road], "lies beside", "beside "),
-    ):
-        if wrong.sum() >= least:
-            shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
-            (first, most), *others = shares.head(NAMED).items()
-            parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}"]
-            parts += [f"{percent(part, 0)} % {beside}{n}" for n, part in others if part >= 0.1]
-            sentences[kind] = f"{', '.join(parts)}{over}."
-    return sentences
-
-
-_QUANTITIES: Final = {
-    "brightness": ("with a brightness {} {} %", "below", "above"),
-    "contrast": ("with a contrast {} {} %", "below", "above"),
-    "shadow": ("with {} {} % shade", "less than", "more than"),
-    "blur": ("with a blur {} {} %", "below", "above"),
-    "change": ("that differ by {} {} % from the frame before", "less than", "more than"),
-    "road_share": ("with {} {} % road", "less than", "more than"),
-    "curvature": ("with a road bent by {} {} % of the width", "less than", "more than"),
-    "seconds": ("{} {} s of the drive", "in the first", "after"),
-    "hour": ("{} {} UTC", "before", "after"),
-}
-"""Words behind "frames" for each quantity, and those for below and above its limit."""
-
-
-def describe_condition(condition: Condition) -> str:
-    """Return a condition as words behind "frames".
-
-    >>> describe_condition(Condition("shadow", ">", 0.3))
-    'with more than 30 % shade'
-    >>> describe_condition(Condition("hour", "<", 17.5))
-    'before 17:30 UTC'
-    """
-    name, limit = condition.quantity, condition.limit
-    if isinstance(limit, str):
-        return f"with {name.removeprefix(TAG)} {limit}"
-    words, below, above = _QUANTITIES.get(name, (f"with {name} {{}} {{}}", "below", "above"))
-    text = f"{100 * limit if '%' in words else limit:g}"
-    if name == "hour":
-        text = f"{int(limit):02d}:{round(limit % 1 * 60):02d}"
-    return words.format(below if condition.operator == "<" else above, text)
-
-
-def describe_part(part: str) -> str:
-    """Return where a part of the image lies.
-
-    >>> describe_part("20-80m"), describe_part("rows_40-60"), describe_part("left")
-    ('20 to 80 m ahead', '40 to 60 % down the image', 'in the left half of the image')
-    """
-    if match := re.fullmatch(r"(\d+)-(\d+)m", part):
-        return f"{match[1]} to {match[2]} m ahead"
-    if match := re.fullmatch(r"rows_(\d+)-(\d+)", part):
-        return f"{match[1]} to {match[2]} % down the image"
-    return f"in the {part} half of the image" if part in ("left", "right") else part
-
-
-def describe_slice(failure: Slice) -> str:
-    """Return where ERR is higher, and by how much, as a sentence.
-
-    >>> shade = Condition("shadow", ">", 0.3)
-    >>> describe_slice(Slice([shade], "20-80m", 90, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01))
-    'In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest (1.8 to 4.9).'
-    """
-    words = describe_place(failure)
-    return (
-        f"{words[0].upper()}{words[1:]}, ERR is {failure.ratio:.1f} times the rest "
-        f"({failure.low:.1f} to {failure.high:.1f})."
-    )
-
-
-def describe_place(failure: Slice) -> str:
-    """Return which frames, and which part of them, a slice is."""
-    conditions = " and ".join(map(describe_condition, failure.conditions))
-    parts = [
-        f"in frames {conditions}" * bool(conditions),
-        failure.part and describe_part(failure.part),
-    ]
-    return ", ".join(filter(None, parts))
 
 
 def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:

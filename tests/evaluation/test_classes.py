@@ -13,7 +13,7 @@ from roadeval.evaluation.score.classes import BESIDE, ClassSums, count_classes
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import by_class
 from roadeval.results.comparison import where
-from roadeval.results.sentences import describe_classes
+from roadeval.results.why import describe_classes
 from tests.evaluation.making import a_drive, a_result, table_of
 
 SHAPE = 9, 13

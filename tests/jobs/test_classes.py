@@ -14,7 +14,7 @@ from mcap_ros2.decoder import DecoderFactory
 from roadeval import Result, replay, replay_fleet, write_report
 from roadeval.evaluation.tables import by_class, only
 from roadeval.logs.writing.writer import LogWriter
-from roadeval.results.sentences import describe_classes
+from roadeval.results.why import describe_classes
 from tests.e2e.test_fleet import Here
 from tests.fixtures.shared import shared
 from tests.jobs.making import NS, settings

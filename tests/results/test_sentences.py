@@ -15,7 +15,8 @@ from roadeval.results.comparison import (
     describe_judgement,
     headline,
 )
-from roadeval.results.sentences import describe_disturbances, notes
+from roadeval.results.sentences import notes
+from roadeval.results.why import describe_disturbances
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 # --- Notes on a frame -----------------------------------------------------------------------------

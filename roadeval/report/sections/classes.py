@@ -12,7 +12,7 @@ from roadeval.report.captions import caption
 from roadeval.report.charts.standard import OF_CLASSES, regions
 from roadeval.report.findings import Findings
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.sentences import describe_classes
+from roadeval.results.why import describe_classes
 
 MOST: Final = 8
 """Most classes in the charts."""

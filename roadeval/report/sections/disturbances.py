@@ -14,7 +14,8 @@ from roadeval.report.findings import Findings
 from roadeval.report.tables import variant_cell
 from roadeval.results.facts import Facts, FleetFacts
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.sentences import correction, describe_disturbances, marked_interval
+from roadeval.results.sentences import correction, marked_interval
+from roadeval.results.why import describe_disturbances
 
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:

@@ -12,7 +12,7 @@ from roadeval.report.captions import caption, note
 from roadeval.report.findings import Findings
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.schema import DAMAGED, SCORED
-from roadeval.results.sentences import describe_place, describe_slice
+from roadeval.results.why import describe_place, describe_slice
 
 
 def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[Block]:
