@@ -263,6 +263,16 @@ def separate(
     return np.array(places, np.int64)
 
 
+def spread(stamps: Sums, ranked: Sums, count: int, besides: Sequence[int] = ()) -> Sums:
+    """Return ``count`` places of a ranking as `separate` does, nearer ones if there are too few."""
+    apart = near_ns(stamps)
+    while True:
+        places = separate(stamps, ranked, count, apart, besides)
+        if len(places) == min(count, len(ranked)) or not apart:
+            return places
+        apart //= 2
+
+
 def changes(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
     """Subtract two variants' final masks frame by frame, ``treated`` minus ``control``.
 

@@ -16,7 +16,6 @@ _REASONS: Final[Mapping[str, str]] = {
     Reason.MIRRORED: "left and right are exchanged",
     Reason.MOVED: "it lies {} of its place",
     Reason.SPECKS: "specks or holes that nothing else has",
-    Reason.CUT: "the road ends at a straight edge that the picture lacks",
     Reason.JUMP: "the labels before and after say {} in the same place",
     Reason.METHODS: "methods that are right here elsewhere see {}",
 }

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from roadeval.data import IGNORE, ROAD
 from roadeval.data.arrays import Flags, Image, Plane, Values
-from roadeval.evaluation.tables import near_ns, separate
+from roadeval.evaluation.tables import spread
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,8 +42,6 @@ _SPECKS: Final = 4
 """Weight of specks and holes: no method and no scene has many, so few pixels say much."""
 _REACH: Final = 12
 """Greatest move that explains a label, in pixels."""
-_LONG: Final = 15
-"""Least number of pixels of an edge that counts as a cut."""
 _UNKNOWN: Final = 255
 """Stands for a prediction that says nothing."""
 _FLOOR: Final = 0.0025
@@ -51,7 +49,7 @@ _FLOOR: Final = 0.0025
 _CLEAR: Final = 4
 """Multiple of the usual score of a drive from which a label is clearly wrong."""
 _MUCH: Final = 10
-"""That multiple for the `_DOUBTFUL` reasons."""
+"""That multiple where only methods say so, which may err themselves."""
 
 
 class Reason(StrEnum):
@@ -61,13 +59,8 @@ class Reason(StrEnum):
     MIRRORED = "mirrored"
     MOVED = "moved"
     SPECKS = "specks"
-    CUT = "cut"
     JUMP = "jump"
     METHODS = "methods"
-
-
-_DOUBTFUL: Final = (Reason.CUT, Reason.METHODS)
-"""Reasons that a method's own mistake may look like."""
 
 
 class Suspect(NamedTuple):
@@ -130,16 +123,19 @@ def find_suspects(views: Sequence[LabelledView]) -> pd.DataFrame:
     """
     import pandas as pd
 
+    names = dict.fromkeys(name for view in views for name in view.masks)
     against = np.zeros((len(views), *views[0].road.shape), np.float32)
-    for name in dict.fromkeys(name for view in views for name in view.masks):
-        _add_evidence(against, views, [view.masks.get(name) for view in views])
-    jumps = np.ones(against.shape, np.bool_)
-    for step in (-1, 1):
-        carried = [_carry_label(views, place, place + step) for place in range(len(views))]
-        jumps &= _add_evidence(against, views, carried)
+    for name in names:
+        against += _odds_against(views, [view.masks.get(name) for view in views])
+    before = _odds_against(views, [None, *map(_carry_label, views, views[1:])])
+    after = _odds_against(views, [*map(_carry_label, views[1:], views), None])
+    against += before
+    against += after
+    jumps = (before > _AGAINST) & (after > _AGAINST)
     roads = np.array([view.road > 127 for view in views])
     suspects = (
-        _suspect(views, place, roads, against[place], jumps[place]) for place in range(len(views))
+        _find_suspect(views, place, roads, against[place], jumps[place])
+        for place in range(len(views))
     )
     return pd.DataFrame([*filter(None, suspects)], columns=[*Suspect._fields])
 
@@ -152,30 +148,21 @@ def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFra
     scores = np.zeros(max(labels, 1))
     scores[: len(suspects)] = suspects["score"]
     usual = _FLOOR + float(np.median(scores))
-    least = np.where(suspects["reason"].isin(_DOUBTFUL), _MUCH, _CLEAR)
+    least = np.where(suspects["reason"] == Reason.METHODS, _MUCH, _CLEAR)
     suspects = suspects.assign(clear=suspects["score"] > least * usual)
     suspects = suspects[suspects["score"] > usual]
-    stamps = suspects["stamp_ns"].to_numpy(np.int64)
     ranked = np.lexsort((-suspects["score"], ~suspects["clear"]))
-    apart = near_ns(stamps)
-    places = separate(stamps, ranked, count, apart)
-    while apart and len(places) < min(count, len(suspects)):
-        apart //= 2
-        places = separate(stamps, ranked, count, apart)
+    places = spread(suspects["stamp_ns"].to_numpy(np.int64), ranked, count)
     return suspects.iloc[places].reset_index(drop=True)
 
 
-def _carry_label(views: Sequence[LabelledView], place: int, other: int) -> Plane | None:
-    """Return the label of another frame as it moves with the picture; `_UNKNOWN` where it is not.
+def _carry_label(near: LabelledView, view: LabelledView) -> Plane:
+    """Return the label of a frame as it moves with the picture to another frame.
 
-    Where the moved picture does not look
-    like this frame's, nothing is known.
+    It is `_UNKNOWN` where the moved picture is unlike the other frame's.
     """
     import cv2
 
-    if not 0 <= other < len(views):
-        return None
-    view, near = views[place], views[other]
     dense = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     flow = dense.calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
     height, width = view.grey.shape
@@ -192,45 +179,39 @@ def _carry_label(views: Sequence[LabelledView], place: int, other: int) -> Plane
     return np.asarray(carried, np.uint8)
 
 
-def _add_evidence(
-    against: Values, views: Sequence[LabelledView], predictions: Sequence[Plane | None]
-) -> npt.NDArray[np.bool_]:
-    """Add to the log odds ``against`` each label what a prediction says of it.
-
-    Returned is where the prediction alone is sure that the labels are wrong, ``(n, H, W)``.
-    """
+def _odds_against(
+    views: Sequence[LabelledView], predictions: Sequence[Plane | None]
+) -> npt.NDArray[np.float32]:
+    """Return the log odds, ``(n, H, W)``, against the labels by a prediction of each."""
     import cv2
+    from scipy.ndimage import convolve1d
 
     height, width = views[0].road.shape
     cells = max(width // _CELL, 1), max(height // _CELL, 1)
-    gaps = np.zeros(against.shape, np.float32)
-    known = np.zeros(against.shape, np.bool_)
+    odds = np.zeros((len(views), height, width), np.float32)
+    is_known = np.zeros(odds.shape, np.bool_)
     sums = np.zeros((2, len(views), cells[1], cells[0]))
     for place, (view, prediction) in enumerate(zip(views, predictions, strict=True)):
-        if prediction is None:
-            continue
-        known[place] = (view.ignored == 0) & (prediction != _UNKNOWN)
-        gaps[place] = cv2.absdiff(prediction, view.road) / np.float32(255) * known[place]
-        for number, plane in enumerate((gaps[place], known[place].astype(np.float32))):
-            small = cv2.resize(plane, cells, interpolation=cv2.INTER_AREA)
-            sums[number, place] = cv2.blur(small, (3, 3))
-    others = sums.sum(axis=1, keepdims=True) - sums
-    before = np.pad(sums.cumsum(axis=1), ((0, 0), (1, 0), (0, 0), (0, 0)))
-    places = np.arange(len(views))
-    ends = np.minimum(places + _NEAR + 1, len(views)), np.maximum(places - _NEAR, 0)
-    near = before[:, ends[0]] - before[:, ends[1]] - sums
+        if prediction is not None:
+            is_known[place] = (view.ignored == 0) & (prediction != _UNKNOWN)
+            odds[place] = cv2.absdiff(prediction, view.road) / np.float32(255) * is_known[place]
+            for part, plane in zip(sums, (odds[place], np.float32(is_known[place])), strict=True):
+                part[place] = cv2.blur(
+                    cv2.resize(plane, cells, interpolation=cv2.INTER_AREA), (3, 3)
+                )
     # Half a frame of errors in one frame is what is believed before any frame is seen.
-    errors, near_errors = ((part[0] + 0.5) / (part[1] + 1) for part in (others, near))
+    total = sums.sum(axis=1, keepdims=True)
+    near = convolve1d(sums, np.ones(2 * _NEAR + 1), axis=1, mode="constant")
+    errors, near_errors = ((part[0] + 0.5) / (part[1] + 1) for part in (total - sums, near - sums))
     share = np.clip(np.maximum(errors, near_errors) + _LEAST, _LEAST, 0.5)
-    odds = np.log((1 - share) / share).astype(np.float32)
-    for place in range(len(views)):
-        weight = cv2.resize(odds[place], (width, height), interpolation=cv2.INTER_LINEAR)
-        gaps[place] = weight * (2 * gaps[place] - 1) * known[place]
-        against[place] += gaps[place]
-    return np.asarray(gaps > _AGAINST)
+    weights = np.log((1 - share) / share).astype(np.float32)
+    for place, weight in enumerate(weights):
+        large = cv2.resize(weight, (width, height), interpolation=cv2.INTER_LINEAR)
+        odds[place] = large * (2 * odds[place] - 1) * is_known[place]
+    return odds
 
 
-def _suspect(
+def _find_suspect(
     views: Sequence[LabelledView], place: int, roads: Flags, against: Values, jump: Flags
 ) -> Suspect | None:
     """Return the area of a label that looks most wrong, and why; None if no pixel does."""
@@ -247,23 +228,21 @@ def _suspect(
     core = cv2.morphologyEx(wrong, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
     counted = np.where(core | is_speck[areas], np.maximum(against - _AGAINST, 0), 0)
     scores = np.bincount(areas.ravel(), counted.ravel(), count) * np.where(is_speck, _SPECKS, 1)
-    scores[(sizes < 4) | (np.arange(count) == 0)] = 0
+    scores[sizes < 4] = 0
     if not scores.any():
         return None
-    area = areas == scores.argmax()
     reason, detail = _explain(views, place, roads, wrong > 0)
-    if reason is not None:
-        area = scores[areas] > 0
-    elif scores[is_speck].sum() > 0.5 * scores.sum():
-        reason, area = Reason.SPECKS, (is_speck & (scores > 0))[areas]
-    else:
-        reason = _look_at(view, road, area, jump)
+    area = scores[areas] > 0
+    if reason is None and scores[is_speck].sum() > 0.5 * scores.sum():
+        reason, area = Reason.SPECKS, area & is_speck[areas]
+    elif reason is None:
+        area = areas == scores.argmax()
+        reason = Reason.JUMP if jump[area].mean() > 0.5 else Reason.METHODS
         detail = "no road" if road[area].mean() > 0.5 else "road"
-    rows, columns = (np.flatnonzero(area.any(axis=axis)) * view.times for axis in (1, 0))
-    ends = int(rows[-1]) + view.times, int(columns[-1]) + view.times
-    top, left, pixels = int(rows[0]), int(columns[0]), int(area.sum()) * view.times**2
+    left, top, width, height = np.multiply(cv2.boundingRect(np.uint8(area)), view.times).tolist()
+    box, pixels = (top, left, top + height, left + width), int(area.sum()) * view.times**2
     score = float(scores.sum()) / road.size
-    return Suspect(view.frame, view.stamp_ns, reason, detail, top, left, *ends, pixels, score)
+    return Suspect(view.frame, view.stamp_ns, reason, detail, *box, pixels, score)
 
 
 def _explain(
@@ -289,21 +268,3 @@ def _explain(
     if max(abs(down), abs(right)) > 1 and misfits.min() < 0.5 * misfits[_REACH, _REACH]:
         return Reason.MOVED, f"{right * view.times},{down * view.times}"
     return None, ""
-
-
-def _look_at(view: LabelledView, road: Flags, area: Flags, jump: Flags) -> Reason:
-    """Return why an area of a label looks wrong, by its edge and by the picture."""
-    import cv2
-
-    if jump[area].mean() > 0.5:
-        return Reason.JUMP
-    cross = np.ones((3, 3), np.uint8)
-    edge = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_GRADIENT, cross) > 0
-    rim = edge & (cv2.dilate(area.astype(np.uint8), cross) > 0)
-    y, x = np.nonzero(rim)
-    slopes = cv2.morphologyEx(cv2.GaussianBlur(view.grey, (5, 5), 1), cv2.MORPH_GRADIENT, cross)
-    if road[area].mean() < 0.5 and len(x) >= _LONG:
-        across = float(np.sqrt(np.linalg.eigvalsh(np.cov(x, y))[0]))
-        if across < 1.5 and slopes[rim].mean() < 0.5 * slopes[edge & ~rim].mean():
-            return Reason.CUT
-    return Reason.METHODS

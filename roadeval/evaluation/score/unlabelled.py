@@ -20,7 +20,7 @@ import numpy as np
 from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, VariantResult, ones
 from roadeval.data.arrays import Floats, Sums, Values
 from roadeval.evaluation.stats.sampling import draw_order
-from roadeval.evaluation.tables import near_ns, separate
+from roadeval.evaluation.tables import spread
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,9 +168,4 @@ def choose_frames(
     missing = max(count - len({*random.tolist()} - {*taken}), 0)
     ranked = scored[np.argsort(-scores[scored], kind="stable")]
     ranked = ranked[~np.isin(ranked, without)]
-    apart = near_ns(stamps)
-    while True:
-        places = separate(stamps, ranked, missing, apart, stamps[without].tolist())
-        if len(places) == min(missing, len(ranked)) or not apart:
-            return random, places
-        apart //= 2
+    return random, spread(stamps, ranked, missing, stamps[without].tolist())
