@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -30,6 +30,9 @@ def argument(metavar: str, text: str) -> Any:
 
 Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
 Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
+LabelFormat = Annotated[
+    Literal["png", "coco"], option("--format", "Format of the labels to correct.")
+]
 Json = Annotated[bool, option("--json", "Print the result on stdout as JSON.")]
 Quiet = Annotated[bool, option("-q --quiet", "No progress and no tables; warnings remain.")]
 

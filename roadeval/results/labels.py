@@ -29,9 +29,8 @@ def describe_suspect(suspect: Mapping[str, Any]) -> str:
     """
     detail = str(suspect["detail"])
     if suspect["reason"] == Reason.MOVED:
-        right, down = map(int, detail.split(","))
-        ways = (right, ("right", "left")), (down, ("below", "above"))
-        detail = " and ".join(f"{abs(by)} px {words[by < 0]}" for by, words in ways if by)
+        ways = zip(map(int, detail.split(",")), ("right left", "below above"), strict=True)
+        detail = " and ".join(f"{abs(by)} px {words.split()[by < 0]}" for by, words in ways if by)
     return _REASONS[suspect["reason"]].format(detail)
 
 
@@ -40,9 +39,9 @@ def describe_suspects(suspects: pd.DataFrame) -> str:
     frames = sorted(suspects[suspects["clear"]]["frame"].tolist())
     if not frames:
         return "No label is clearly wrong."
-    verb = "looks" if len(frames) == 1 else "look"
-    noun = "The label of 1 frame" if len(frames) == 1 else f"The labels of {len(frames)} frames"
-    return f"{noun} {verb} wrong: {first_of([*map(str, frames)], 10)}."
+    many = f"The labels of {len(frames)} frames look"
+    looks = many if len(frames) > 1 else "The label of 1 frame looks"
+    return f"{looks} wrong: {first_of([*map(str, frames)], 10)}."
 
 
 def describe_annotator(name: str, share: float, frames: int) -> str:

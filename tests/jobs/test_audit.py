@@ -159,6 +159,21 @@ def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: 
         roadeval.audit(place / "drive.rrd", folder=tmp_path)
 
 
+def test_a_fleet_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "fleet.json").write_text("{}")
+    with pytest.raises(RoadevalError, match="a fleet: audit its drives one by one"):
+        roadeval.audit(tmp_path)
+
+
+def test_labels_to_correct_of_reduced_frames_are_refused_before_the_replay(
+    place: Path, tmp_path: Path
+) -> None:
+    config = settings().override({"frames": {"scale": 0.5}})
+    with pytest.raises(RoadevalError, match="does not go with labels to correct"):
+        roadeval.audit(place / "no_log.mcap", folder=tmp_path / "x", config=config)
+    assert not (tmp_path / "x").exists()
+
+
 def test_an_annotator_without_masks_is_refused(place: Path) -> None:
     with pytest.raises(RoadevalError, match="no masks of c"):
         roadeval.audit(place / "drive.rrd", annotators=["c"])

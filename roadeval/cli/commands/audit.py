@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import join, quote
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -34,9 +34,7 @@ def audit(
     output: Annotated[
         Path | None, arguments.option("-o --output", "Folder for labels to correct.", "FOLDER")
     ] = None,
-    form: Annotated[
-        Literal["png", "coco"], arguments.option("--format", "Format of the labels to correct.")
-    ] = "png",
+    form: arguments.LabelFormat = "png",
     annotators: Annotated[
         list[str] | None,
         arguments.option(
@@ -53,8 +51,8 @@ def audit(
         roadeval audit recordings/drive.rrd --annotator b
 
     A label looks wrong where methods that are right elsewhere agree against it, or the labels
-    before and after; where it has specks, holes or cut edges; and where another frame, a mirror or
-    a move explains it. FOLDER/suspects shows where, FOLDER/proposals has the present labels; put
+    before and after; where it has specks or holes; and where another frame, a mirror or a move
+    explains it. FOLDER/suspects shows where, FOLDER/proposals has the present labels; put
     the corrected ones into FOLDER/labels. 'replay --truth FOLDER' reads these in place of the
     drive's own.
     """
@@ -67,43 +65,45 @@ def audit(
     from roadeval.results.rows import records
 
     with progress.show(quiet) as watch:
-        found = run(
+        done = run(
             *(source, count, output, config),
             labels=form,
             annotators=annotators or (),
             on_progress=watch,
         )
     if json:
-        about = {"labels": found.labels, "sentences": found.sentences}
-        about["suspects"] = records(found.suspects)
+        about = {"labels": done.labels, "sentences": done.sentences}
+        about["suspects"] = records(done.suspects)
         console.emit(json_text(plain(about)).rstrip())
     elif not quiet:
-        _show(found, output)
+        _show(done, output)
     messages.warn_of_missing_loops()
     return ExitCode.DONE
 
 
-def _show(found: Audit, output: Path | None) -> None:
+def _show(done: Audit, output: Path | None) -> None:
     """Print the labels that look wrong, and what to do with them."""
     from roadeval.cli.screens.tables import show_table
     from roadeval.report.blocks import Table
 
     out = console.results()
-    for sentence in found.sentences:
+    for sentence in done.sentences:
         console.say(sentence, out)
-    rows = found.suspects
-    if not len(rows):
+    if not len(done.suspects):
         return
-    columns = {
-        "": rows["rank"],
-        "frame": rows["frame"],
-        "wrong": rows["clear"].map({True: "clearly", False: "perhaps"}),
-        "columns, rows": [f"{r.left}-{r.right}, {r.top}-{r.bottom}" for r in rows.itertuples()],
-        "why": rows["why"],
-    }
-    cells = [[str(cell) for cell in row] for row in zip(*columns.values(), strict=True)]
+    rows = [
+        [
+            str(row.rank),
+            str(row.frame),
+            "clearly" if row.clear else "perhaps",
+            f"{row.left}-{row.right}, {row.top}-{row.bottom}",
+            str(row.why),
+        ]
+        for row in done.suspects.itertuples()
+    ]
     out.print()
-    show_table(Table([*columns], cells, text_columns=[2, 3, 4]), out)
+    titles = ["", "frame", "wrong", "columns, rows", "why"]
+    show_table(Table(titles, rows, text_columns=[2, 3, 4]), out)
     out.print()
     if output is None:
         out.print("-o FOLDER writes these labels for correction, with pictures.")
@@ -113,6 +113,6 @@ def _show(found: Audit, output: Path | None) -> None:
         f"results into {output}/labels.",
         out,
     )
-    config = f" --config {quote(str(found.config))}" if found.config else ""
-    command = f"roadeval replay {join([found.log])}{config} --truth {quote(str(output))}"
-    console.show_next(out, command)
+    config = f" --config {quote(str(done.config))}" if done.config else ""
+    truth = f"--truth {quote(str(output))}"
+    console.show_next(out, f"roadeval replay {join([done.log])}{config} {truth}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from shlex import join, quote
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
@@ -32,10 +32,7 @@ def pick(
     output: Annotated[
         Path, arguments.option("-o --output", "Folder; an existing one is extended.", "FOLDER")
     ],
-    form: Annotated[
-        Literal["png", "coco"],
-        arguments.option("--format", "Format of the proposed masks."),
-    ] = "png",
+    form: arguments.LabelFormat = "png",
     variant: Annotated[
         str | None,
         arguments.option(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
@@ -25,14 +24,13 @@ from roadeval.evaluation.score.label_errors import (
 from roadeval.evaluation.tables import concatenate
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
-from roadeval.jobs.results.pick import PNG, open_drives
+from roadeval.jobs.results.pick import PNG, open_drives, proposal_files
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs.settings import AUDIT
 from roadeval.logs.truth.audits import FORMAT
-from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import IMAGES, LABELS, PROPOSALS
 from roadeval.logs.truth.shapes import Proposal
-from roadeval.recording.layout import DamagedError, RecordingError
+from roadeval.results.facts import is_fleet
 from roadeval.results.folder import RUN
 from roadeval.results.labels import describe_annotator, describe_suspect, describe_suspects
 from roadeval.results.rows import records
@@ -93,95 +91,82 @@ def audit(
     RoadevalError
         If there are no labels to look at, or the folder holds something else.
     """
-    path = Path(source)
-    if folder is not None and Path(folder).exists() and any(Path(folder).iterdir()):
-        raise RoadevalError(f"{folder}: is not empty; name a folder of its own")
+    path, config = Path(source), config or RunConfig()
+    output = None if folder is None else Path(folder)
+    if output and output.exists() and any(output.iterdir()):
+        raise RoadevalError(f"{output}: is not empty; name a folder of its own")
+    if is_fleet(path):
+        raise RoadevalError(f"{path}: a fleet: audit its drives one by one")
+    if output:
+        _check_scale(config.frames.scale)
     with TemporaryDirectory(prefix="roadeval-") as place:
-        drives = open_drives([path], Path(place), config or RunConfig(), on_progress)
-        if len(drives) > 1:
-            raise RoadevalError(f"{path}: a fleet: audit its drives one by one")
-        ((path, drive, run),) = drives
-        shares, tables, labelled = dict[str, list[float]](), [], 0
-        frames, total = _labelled_views(drive, annotators, shares), len(drive.pictured)
-        alike = -(-total // max(-(-total // BLOCK), 1))  # no block is much smaller than others
-        while views := [*islice(frames, alike)]:
-            tables.append(find_suspects(views))
-            labelled += len(views)
-        if not labelled:
+        ((_, drive, run),) = open_drives([path], Path(place), config, on_progress)
+        if output:
+            _check_scale(drive.facts.run.get("frames", {}).get("scale", 1))
+        frames = [frame for frame in drive.pictured if drive.truth(frame) is not None]
+        if not frames:
             raise RoadevalError(
                 f"{path}: no frame with truth and a picture: give --truth, or replay with "
                 "--record masks"
             )
-        suspects = rank_suspects(concatenate(tables), labelled, count)
+        blocks = np.array_split(frames, -(-len(frames) // BLOCK))
+        tables = [find_suspects([_view(drive, int(frame)) for frame in block]) for block in blocks]
+        suspects = rank_suspects(concatenate(tables), len(frames), count)
         suspects.insert(0, "rank", range(1, len(suspects) + 1))
         suspects["why"] = [describe_suspect(row) for row in records(suspects)]
         sentences = [*drive.facts.misfits, describe_suspects(suspects)]
         for name in annotators:
-            if name not in shares:
+            shares = [*_differing_shares(drive, frames, name)]
+            if not shares:
                 raise RoadevalError(f"{path}: no masks of {name} on a frame with truth")
-            share = float(np.mean(shares[name]))
-            sentences.append(describe_annotator(name, share, len(shares[name])))
-        if folder is not None:
-            _write_audit(drive, suspects, Path(folder), labels, run)
-        repeats = Path(folder, RUN) if run and folder is not None else None if run else path
+            sentences.append(describe_annotator(name, float(np.mean(shares)), len(shares)))
+        if output:
+            _write_audit(drive, suspects, output, labels, run)
+        repeats = path if run is None else output and output / RUN
         log = drive.facts.log
-        return Audit(suspects, labelled, sentences, log.path if log else drive.name, repeats)
+        return Audit(suspects, len(frames), sentences, log.path if log else drive.name, repeats)
 
 
-def _labelled_views(
-    drive: DriveResult, annotators: Sequence[str], shares: dict[str, list[float]]
-) -> Iterator[LabelledView]:
-    """Yield the labelled frames; note on what share of pixels each annotator differs."""
-    recording = drive.recording
+def _check_scale(scale: float) -> None:
+    if scale != 1:
+        raise RoadevalError("does not go with labels to correct", setting="frames.scale")
+
+
+def _view(drive: DriveResult, frame: int) -> LabelledView:
+    recording, truth = drive.recording, drive.truth(frame)
     assert recording is not None
-    for frame in drive.pictured:
-        try:
-            truth = recording.truth(frame)
-        except DamagedError:
-            raise
-        except RecordingError:
-            continue
-        layers = ((v.name, drive.layer(v.name, v.stages[-1], frame)) for v in recording.variants)
-        masks = {name: (mask == 1).astype(np.uint8) for name, mask in layers if mask is not None}
-        labelled = truth != IGNORE
-        for name in annotators:
-            if name in masks and labelled.any():
-                differ = (masks[name] != truth)[labelled]
-                shares.setdefault(name, []).append(float(differ.mean()))
-        stamp = recording.stamps[frame]
-        yield LabelledView.of(frame, stamp, recording.image(frame), truth, masks)
+    assert truth is not None
+    masks = {name: (mask == 1).astype(np.uint8) for name, mask in drive.final_masks(frame).items()}
+    return LabelledView.of(frame, recording.stamps[frame], recording.image(frame), truth, masks)
+
+
+def _differing_shares(drive: DriveResult, frames: Sequence[int], name: str) -> Iterator[float]:
+    """Yield on what share of a frame's labelled pixels a mask and the truth differ."""
+    for frame in frames:
+        truth, mask = drive.truth(frame), drive.final_masks(frame).get(name)
+        if truth is not None and mask is not None and (truth != IGNORE).any():
+            yield float(((mask == 1) != truth)[truth != IGNORE].mean())
 
 
 def _write_audit(
-    drive: DriveResult,
-    suspects: pd.DataFrame,
-    folder: Path,
-    labels: str,
-    run: str | None,
+    drive: DriveResult, suspects: pd.DataFrame, folder: Path, labels: str, run: str | None
 ) -> None:
     """Write images, labels to correct and pictures, and last what was found."""
     recording, facts, rows = drive.recording, drive.facts, records(suspects)
     assert recording is not None
-    if facts.run.get("frames", {}).get("scale", 1) != 1:
-        raise RoadevalError("does not go with labels to correct", setting="frames.scale")
     with writing(folder, RoadevalError):
         for part in (IMAGES, PROPOSALS, LABELS, SUSPECTS):
             (folder / part).mkdir(parents=True, exist_ok=True)
-        proposals, files = [], dict[str, bytes]()
+        proposals = []
         for suspect in rows:
             frame, name = suspect["frame"], f"{suspect['stamp_ns']:019d}.png"
             image, truth = recording.image(frame), recording.truth(frame)
             proposals.append(Proposal(name, truth == ROAD, truth == IGNORE))
-            levels = np.select([truth == ROAD, truth == IGNORE], [255, 128], 0).astype(np.uint8)
-            files[f"{PROPOSALS}/{name}"] = png_of(levels)
-            files[f"{IMAGES}/{name}"] = png_of(image)
-            shown = f"{SUSPECTS}/{suspect['rank']:02d}_frame_{frame:04d}.png"
-            files[shown] = png_of(_mark(image, truth, suspect))
-        if labels != PNG:
-            files = {name: data for name, data in files.items() if not name.startswith(PROPOSALS)}
-            files |= {f"{PROPOSALS}/{name}": data for name, data in as_coco(proposals).items()}
-        for name, content in files.items():
-            (folder / name).write_bytes(content)
+            shown = f"{suspect['rank']:02d}_frame_{frame:04d}.png"
+            (folder / IMAGES / name).write_bytes(png_of(image))
+            (folder / SUSPECTS / shown).write_bytes(png_of(_mark(image, truth, suspect)))
+        for name, content in proposal_files(proposals, labels).items():
+            (folder / PROPOSALS / name).write_bytes(content)
         if run:
             put(folder / RUN, run.encode())
         put(folder / "audit.csv", suspects.to_csv(index=False).encode())

@@ -93,11 +93,7 @@ class FramePicker:
         recording = self._recording
         for frame in numbers if recording else ():
             assert recording is not None
-            masks = {
-                variant.name: mask
-                for variant in recording.variants
-                if (mask := self._result.layer(variant.name, variant.stages[-1], frame)) is not None
-            }
+            masks = self._result.final_masks(frame)
             truth = recording.truth(frame) if frame in self._scored else None
             yield ExampleFrame(frame, recording.image(frame), truth, masks)
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PNG: Final = "png"
-"""The format of masks as images, 255 where there is road."""
+"""The format of masks as images: 255 where there is road, 128 where nothing counts."""
 
 
 @dataclass(frozen=True)
@@ -259,18 +259,20 @@ def _write_picks(
             name = f"{frame.stamp_ns:019d}.png"
             (folder / IMAGES / name).write_bytes(png_of(recording.image(frame.frame)))
             proposals.append(Proposal(name, mask))
-        files = (
-            {frame.image: png_of(np.uint8(255) * frame.road) for frame in proposals}
-            if request.labels == PNG
-            else as_coco(proposals)
-        )
-        for name, content in files.items():
+        for name, content in proposal_files(proposals, request.labels).items():
             path = folder / PROPOSALS / name
             wave = new[0][0].wave if path.exists() else ""
             path.with_name(f"{wave}{name}").write_bytes(content)
         if request.run:
             put(folder / RUN, request.run.encode())
         put(folder / PICK, picks.text().encode())
+
+
+def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, bytes]:
+    """Return the files with masks to correct, by their names."""
+    if labels != PNG:
+        return as_coco(proposals)
+    return {proposal.image: png_of(proposal.levels) for proposal in proposals}
 
 
 def _empty_picks(drive: DriveResult, rows: pd.DataFrame, variant: str, request: _Request) -> Picks:

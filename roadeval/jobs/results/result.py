@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
 from itertools import chain
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from roadeval.data.arrays import Plane
+from roadeval.data.result import Cells
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
 from roadeval.evaluation.comparison.pairing import ComparedDrive
@@ -53,6 +55,16 @@ OF_ALL: Final = ("code of ", "network ")
 """Beginnings of the names that `input_digests` gives to files of all drives of a fleet."""
 NO_NUMBER: Final = ("output", "run", "fleet", "labels.names", "frames.disturb")
 """Tables of a run's settings that change no number."""
+
+
+def _if_there(read: Callable[..., Cells], *address: Any) -> Cells | None:
+    """Read a picture of a recording; None if it has none there."""
+    try:
+        return read(*address)
+    except DamagedError:
+        raise
+    except RecordingError:
+        return None
 
 
 class DriveResult:
@@ -229,12 +241,21 @@ class DriveResult:
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
         """Return a layer of a variant; None where the run did not keep it."""
         assert self.recording is not None
-        try:
-            return self.recording.layer(variant, name, frame)
-        except DamagedError:
-            raise
-        except RecordingError:
-            return None
+        return _if_there(self.recording.layer, variant, name, frame)
+
+    def truth(self, frame: int) -> Plane | None:
+        """Return the truth of a frame; None where there is none."""
+        assert self.recording is not None
+        return _if_there(self.recording.truth, frame)
+
+    def final_masks(self, frame: int) -> dict[str, Cells]:
+        """Return the final masks of a frame that the run kept, by their variants."""
+        assert self.recording is not None
+        layers = (
+            (variant.name, self.layer(variant.name, variant.stages[-1], frame))
+            for variant in self.recording.variants
+        )
+        return {name: mask for name, mask in layers if mask is not None}
 
     @property
     def properties(self) -> Mapping[str, str | int | float]:

@@ -237,6 +237,12 @@ class Proposal(NamedTuple):
         height, width = self.road.shape
         return width, height
 
+    @property
+    def levels(self) -> npt.NDArray[np.uint8]:
+        """``(H, W)``: 255 where there is road, 128 where pixels are ignored, else 0."""
+        levels = np.uint8(255) * self.road
+        return levels if self.ignored is None else np.where(self.ignored, np.uint8(128), levels)
+
     def runs(self, *, by_columns: bool = False) -> list[int]:
         """Return the lengths of its runs, alternately outside and inside, the first outside."""
         pixels = self.road.T.ravel() if by_columns else self.road.ravel()

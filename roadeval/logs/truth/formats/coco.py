@@ -105,27 +105,25 @@ def as_coco(proposals: Sequence[shapes.Proposal]) -> dict[str, bytes]:
 
     Ignored pixels are a second region, of the class ``ignore``.
     """
-    images, annotations, classes = list[Any](), list[Any](), ["road"]
+    import cv2
+
+    images, annotations = list[Any](), list[Any]()
     for number, proposal in enumerate(proposals, 1):
         width, height = proposal.size
         images.append({"id": number, "file_name": proposal.image, "width": width, "height": height})
         areas = [proposal.road]
         if proposal.ignored is not None and proposal.ignored.any():
             areas.append(proposal.ignored)
-            classes = ["road", "ignore"]
         for category, area in enumerate(areas, 1):
-            rows, columns = (np.flatnonzero(area.any(axis=axis)).tolist() for axis in (1, 0))
-            box = [0, 0, 0, 0]
-            if rows:
-                left, top = columns[0], rows[0]
-                box = [left, top, columns[-1] + 1 - left, rows[-1] + 1 - top]
+            box = list(cv2.boundingRect(area.view(np.uint8)))
             about = {"id": len(annotations) + 1, "image_id": number, "category_id": category}
             counts = proposal._replace(road=area).runs(by_columns=True)
             runs = {"size": [height, width], "counts": counts}
             shape = {"iscrowd": 1, "area": int(area.sum()), "bbox": box, "segmentation": runs}
             annotations.append({**about, **shape})
     content = {"images": images, "annotations": annotations}
-    content["categories"] = [{"id": place, "name": name} for place, name in enumerate(classes, 1)]
+    names = ["road", *["ignore"] * any(proposal.ignored is not None for proposal in proposals)]
+    content["categories"] = [{"id": place, "name": name} for place, name in enumerate(names, 1)]
     return {"instances.json": json.dumps(content).encode()}
 
 
