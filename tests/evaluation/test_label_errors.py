@@ -92,5 +92,14 @@ def test_what_a_method_always_gets_wrong_is_no_sign_against_labels() -> None:
     assert describe_suspects(suspects) == "No label is clearly wrong."
 
 
+def test_narrow_pictures_have_no_neighbours_to_compare() -> None:
+    label = np.ones((20, 320), np.uint8)
+    narrow = [
+        LabelledView.of(frame, frame, np.zeros((20, 320, 3), np.uint8), label, {})
+        for frame in range(3)
+    ]
+    assert not len(find_suspects(narrow))
+
+
 def test_one_frame_alone_has_nothing_to_compare() -> None:
     assert not len(rank_suspects(find_suspects(views(is_wrong=True)[3:4]), 1, 20))

@@ -156,13 +156,15 @@ def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFra
     return suspects.iloc[places].reset_index(drop=True)
 
 
-def _carry_label(near: LabelledView, view: LabelledView) -> Plane:
+def _carry_label(near: LabelledView, view: LabelledView) -> Plane | None:
     """Return the label of a frame as it moves with the picture to another frame.
 
-    It is `_UNKNOWN` where the moved picture is unlike the other frame's.
+    It is `_UNKNOWN` where the moved picture is unlike the other frame's; None of narrow pictures.
     """
     import cv2
 
+    if min(view.grey.shape) < 32:  # OpenCV compares 8x8 pixels at a quarter of the size, or crashes
+        return None
     dense = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     flow = dense.calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))
     height, width = view.grey.shape
