@@ -213,18 +213,15 @@ class Log:
         missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
         label image has another size, or no mask belongs to a frame.
         """
-        config, corrected = self.config, list[str]()
         try:
-            while (before := without_corrections(config)) is not None:
-                corrected.append(config.truth.path)
-                config = before
+            config, audits = without_corrections(self.config)
             selection = settle(self.topics, self.readers, config, of_rig=self.of_rig)
             if (place := config.truth).path:
                 settings = MaskSettings(**vars(place), labels=config.labels)
                 truth = self._beside_log(settings, selection, config.topics.sync_offset_ms)
                 selection = replace(selection, labels={TRUTH: truth, **selection.labels})
-            if corrected and selection.truth is not None:
-                truth = self._with_corrections(selection.truth, corrected, selection)
+            if audits and selection.truth is not None:
+                truth = self._with_corrections(selection.truth, audits, selection)
                 selection = replace(selection, labels={**selection.labels, TRUTH: truth})
             masks = {name: self._masks(name, m, selection) for name, m in self.config.masks.items()}
         except LogError as error:
@@ -236,18 +233,18 @@ class Log:
     ) -> LabelSource:
         """Return the truth with the labels in some folders in place of its own."""
         sources = [self._beside_log(MaskSettings(path=path), selection) for path in folders]
-        notes = [
+        notes = tuple(
             f"the labels of {counted(len(source.pictures), 'frame')} are from {source.where}; "
             f"all others are those of {truth.where}"
             for source in sources
-        ]
+        )
 
         def digest() -> str:
             parts = [source.digest() for source in (truth, *sources) if source.digest]
             return hashlib.sha256(" ".join(parts).encode()).hexdigest()
 
-        all_notes = *truth.notes, *notes
-        return replace(truth, digest=digest, notes=all_notes, corrections=tuple(sources))
+        corrections = tuple(sources)
+        return replace(truth, digest=digest, notes=truth.notes + notes, corrections=corrections)
 
     def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> LabelSource:
         """Read masks that lie beside the log; their messages name the settings of their variant."""

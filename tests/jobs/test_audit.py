@@ -153,6 +153,17 @@ def test_an_audit_without_a_corrected_label_is_no_truth(place: Path, tmp_path: P
     assert "no label in it yet" in describe(place / "drive.mcap", config).problem
 
 
+def test_audits_that_correct_each_other_are_damaged(place: Path, tmp_path: Path) -> None:
+    for folder, corrected in (("a", "b"), ("b", "a")):
+        roadeval.audit(place / "drive.rrd", 1, tmp_path / folder)
+        about = json.loads((tmp_path / folder / "audit.json").read_text())
+        about["run"]["truth"]["path"] = str(tmp_path / corrected)
+        about["run"]["topics"]["truth"] = None
+        (tmp_path / folder / "audit.json").write_text(json.dumps(about))
+    config = settings().override({"truth": {"path": str(tmp_path / "a")}})
+    assert "not as roadeval audit writes it" in describe(place / "drive.mcap", config).problem
+
+
 def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").touch()
     with pytest.raises(RoadevalError, match="is not empty"):

@@ -134,7 +134,7 @@ def open_drives(
         drive = Result(made).drive
         if drive is None or drive.recording is None:
             raise RoadevalError(
-                f"{made}: frames are picked from a recording of one camera; give the log, and "
+                f"{made}: this command takes a recording of one camera; give the log, and "
                 "of several cameras one with --image-topic"
             )
         drives.append((path, drive, run))
