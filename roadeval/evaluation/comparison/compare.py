@@ -368,13 +368,11 @@ def _compare_two(
 
 def _class_changes(label: str, base: pd.DataFrame, new: pd.DataFrame) -> Iterator[ClassChange]:
     """Yield the shares of the false road that are at least a hundredth; one may lack the names."""
-    texts = [*map(str, concatenate([base, new])["name"])]
-    values = [*base["class"], *new["class"]]
-    named = {value: text for value, text in zip(values, texts, strict=True) if text}
-    names = [text or named.get(value, "") for value, text in zip(values, texts, strict=True)]
-    base, new = base.assign(name=names[: len(base)]), new.assign(name=names[len(base) :])
+    both = concatenate([base.assign(side="base"), new.assign(side="new")])
+    names = both["name"].astype(str).replace("", None)
+    both["name"] = names.fillna(names.groupby(both["class"]).transform("last")).fillna("")
     for variant in [name for name in values_of(new, "variant") if name != BASELINE]:
-        sides = (by_class(only(rows, variant=variant)) for rows in (base, new))
+        sides = (by_class(only(both, variant=variant, side=side)) for side in ("base", "new"))
         before, after = (shares["false"][shares["truth"] == "other"] for shares in sides)
         shares = after.to_frame("new").join(before.rename("base"), how="outer").fillna(0)
         if before.isna().all() or after.isna().all() or shares["new"].equals(shares["base"]):

@@ -11,6 +11,7 @@ import numpy as np
 
 from roadeval.data import NO_CLASS, NON_ROAD, ROAD, Classes, Mask, Moment, Truth, TruthClass
 from roadeval.data.arrays import Sums
+from roadeval.evaluation.tables import separate
 
 BESIDE: Final = 75
 """Missed road lies beside a class within a 75th of the image's diagonal: 8 pixels of 480x360."""
@@ -77,11 +78,9 @@ class ClassSums:
                     if len(worst) == SHOWN and cost <= worst[-1][0]:
                         continue
                     ranked = sorted([*worst, (cost, moment)], key=lambda frame: -frame[0])
-                    worst.clear()
-                    for frame in ranked:
-                        times = [abs(frame[1].stamp_ns - at.stamp_ns) for _, at in worst]
-                        if len(worst) < SHOWN and min(times, default=APART_NS) >= APART_NS:
-                            worst.append(frame)
+                    stamps = np.array([at.stamp_ns for _, at in ranked])
+                    places = separate(stamps, np.arange(len(ranked)), SHOWN, APART_NS)
+                    worst[:] = [ranked[place] for place in places]
 
     def rows(self, classes: Sequence[TruthClass]) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of ``classes``; none if classes tell no more than the truth itself.
