@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Who augments with albumentations' ImageCompression trains on JPEGs in which red and blue changed places.
+# albumentations' ImageCompression damages red as JPEG damages blue, and blue as JPEG damages red.
 #
 # Software: albumentations 2.0.8 with OpenCV 4.12.0, against Pillow 11.3.0.
 #
@@ -18,8 +18,8 @@ set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet --no-compile --disable-pip-version-check albumentations==2.0.8 \
-  opencv-python-headless==4.12.0.88 pillow==11.3.0 numpy==2.2.6
+"$folder/venv/bin/pip" install --quiet --no-compile --disable-pip-version-check \
+  albumentations==2.0.8 opencv-python-headless==4.12.0.88 pillow==11.3.0 numpy==2.2.6
 NO_ALBUMENTATIONS_UPDATE=1 "$folder/venv/bin/python" - <<'PYTHON'
 import io
 
