@@ -91,19 +91,13 @@ def _show(done: Audit, output: Path | None) -> None:
         console.say(sentence, out)
     if not len(done.suspects):
         return
-    rows = [
-        [
-            str(row.rank),
-            str(row.frame),
-            "clearly" if row.clear else "perhaps",
-            f"{row.left}-{row.right}, {row.top}-{row.bottom}",
-            str(row.why),
-        ]
-        for row in done.suspects.itertuples()
-    ]
-    out.print()
+    rows = done.suspects.astype(str)
+    clear = rows["clear"].map({"True": "clearly", "False": "perhaps"})
+    area = rows["left"] + "-" + rows["right"] + ", " + rows["top"] + "-" + rows["bottom"]
+    cells = [*zip(rows["rank"], rows["frame"], clear, area, rows["why"], strict=True)]
     titles = ["", "frame", "wrong", "columns, rows", "why"]
-    show_table(Table(titles, rows, text_columns=[2, 3, 4]), out)
+    out.print()
+    show_table(Table(titles, cells, text_columns=[2, 3, 4]), out)
     out.print()
     if output is None:
         out.print("-o FOLDER writes these labels for correction, with pictures.")

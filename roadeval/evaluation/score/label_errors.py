@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -101,18 +101,19 @@ class LabelledView:
     def of(
         cls, frame: int, stamp_ns: int, image: Image, truth: Plane, masks: Mapping[str, Plane]
     ) -> LabelledView:
-        """Reduce an ``(H, W, 3)`` image, its truth and the masks (0, 1) of methods."""
+        """Reduce an ``(H, W, 3)`` image, its truth and the masks of methods, 1 for road."""
         import cv2
 
         times = -(-image.shape[1] // _WIDEST)
         size = max(image.shape[1] // times, 1), max(image.shape[0] // times, 1)
 
-        def reduced(plane: Plane) -> Plane:
+        def reduce(plane: Any) -> Plane:
             return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.uint8)
 
-        road, ignored = (reduced((truth == code) * np.uint8(255)) for code in (ROAD, IGNORE))
-        small = {name: reduced(mask * np.uint8(_UNKNOWN - 1)) for name, mask in masks.items()}
-        grey = reduced(np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8))
+        grey = reduce(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+        road, ignored = (reduce((truth == code) * np.uint8(255)) for code in (ROAD, IGNORE))
+        sure = np.uint8(_UNKNOWN - 1)
+        small = {name: reduce((mask == ROAD) * sure) for name, mask in masks.items()}
         return cls(frame, stamp_ns, grey, road, ignored, small, times)
 
 
@@ -133,10 +134,8 @@ def find_suspects(views: Sequence[LabelledView]) -> pd.DataFrame:
     against += after
     jumps = (before > _AGAINST) & (after > _AGAINST)
     roads = np.array([view.road > 127 for view in views])
-    suspects = (
-        _find_suspect(views, place, roads, against[place], jumps[place])
-        for place in range(len(views))
-    )
+    places = zip(range(len(views)), against, jumps, strict=True)
+    suspects = (_find_suspect(views, roads, *place) for place in places)
     return pd.DataFrame([*filter(None, suspects)], columns=[*Suspect._fields])
 
 
@@ -214,7 +213,7 @@ def _odds_against(
 
 
 def _find_suspect(
-    views: Sequence[LabelledView], place: int, roads: Flags, against: Values, jump: Flags
+    views: Sequence[LabelledView], roads: Flags, place: int, against: Values, jump: Flags
 ) -> Suspect | None:
     """Return the area of a label that looks most wrong, and why; None if no pixel does."""
     import cv2
@@ -233,7 +232,7 @@ def _find_suspect(
     scores[sizes < 4] = 0
     if not scores.any():
         return None
-    reason, detail = _explain(views, place, roads, wrong > 0)
+    reason, detail = _explain(views, roads, place, wrong > 0)
     area = scores[areas] > 0
     if reason is None and scores[is_speck].sum() > 0.5 * scores.sum():
         reason, area = Reason.SPECKS, area & is_speck[areas]
@@ -248,7 +247,7 @@ def _find_suspect(
 
 
 def _explain(
-    views: Sequence[LabelledView], place: int, roads: Flags, wrong: Flags
+    views: Sequence[LabelledView], roads: Flags, place: int, wrong: Flags
 ) -> tuple[Reason | None, str]:
     """Return which one mistake makes a label as it is; the number of the frame, or the move."""
     import cv2

@@ -136,8 +136,8 @@ def _view(drive: DriveResult, frame: int) -> LabelledView:
     recording, truth = drive.recording, drive.truth(frame)
     assert recording is not None
     assert truth is not None
-    masks = {name: (mask == 1).astype(np.uint8) for name, mask in drive.final_masks(frame).items()}
-    return LabelledView.of(frame, recording.stamps[frame], recording.image(frame), truth, masks)
+    stamp, masks = recording.stamps[frame], drive.final_masks(frame)
+    return LabelledView.of(frame, stamp, recording.image(frame), truth, masks)
 
 
 def _differing_shares(drive: DriveResult, frames: Sequence[int], name: str) -> Iterator[float]:
