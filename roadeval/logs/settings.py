@@ -193,10 +193,12 @@ class LabelSettings:
     ) -> LabelSettings:
         """Return the settings with the values, or colours, of classes that they call by name.
 
-        ``names`` are further names by value, which the log tells; ``classes`` are names that stand
-        in the labels themselves. A `LogError` if there are names, but a class is none of them.
+        ``names`` are further names by value, which the log tells: none of colours. ``classes`` are
+        names that stand in the labels themselves. A `LogError` if there are names, but a class is
+        none of them.
         """
-        names, chosen = {**(names or {}), **self.names}, dict[str, Any]()
+        names = self.names if self.by_color else {**(names or {}), **self.names}
+        chosen = dict[str, Any]()
         for setting in ("road", "ignore"):
             labels: list[Any] = []
             for label in getattr(self, setting):

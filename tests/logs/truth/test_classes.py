@@ -215,3 +215,8 @@ def test_ids_of_a_folder_can_be_called_by_name(tmp_path):
     labels = LabelSettings(road=("road",), names={"3": "road"})
     meaning = meaning_of(opened(folder), MaskSettings(labels=labels))
     assert meaning.of_values(np.array([[3, 4]], np.uint8)).tolist() == [[1, 0]]
+
+
+def test_names_of_values_in_the_log_are_none_of_colours():
+    by_color = LabelSettings(road=("road",), names={"64,32,32": "road"})
+    assert by_color.with_values("/labels", {"3": "car"}).road_colors == ((64, 32, 32),)
