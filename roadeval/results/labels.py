@@ -17,7 +17,7 @@ _REASONS: Final[Mapping[str, str]] = {
     Reason.MOVED: "it lies {} of its place",
     Reason.SPECKS: "specks or holes that nothing else has",
     Reason.JUMP: "the labels before and after say {} in the same place",
-    Reason.METHODS: "methods that are right here elsewhere see {}",
+    Reason.METHODS: "methods that are right at this place in other frames see {}",
 }
 
 

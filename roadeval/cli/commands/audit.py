@@ -59,11 +59,14 @@ def audit(
     if options and (source.suffix == ".rrd" or (source / "summary.json").is_file()):
         raise typer.BadParameter(f"{source}: a result has its truth and masks; give the log")
     arguments.check_one_camera(options)
-    config = arguments.configuration(options)
+    from roadeval.jobs.results.audit import PRESET
     from roadeval.jobs.results.audit import audit as run
     from roadeval.results.facts import json_text, plain
     from roadeval.results.rows import records
 
+    config = arguments.configuration(
+        options if "config" in options else {"preset": PRESET, **options}
+    )
     with progress.show(quiet) as watch:
         done = run(
             *(source, count, output, config),
@@ -103,7 +106,8 @@ def _show(done: Audit, output: Path | None) -> None:
         out.print("-o FOLDER writes these labels for correction, with pictures.")
         return
     console.say(
-        f"Look at {output}/suspects. Correct what is wrong in {output}/proposals, and put the "
+        f"Look at {output}/suspects: road is green with a yellow edge, the area in doubt has an "
+        f"orange box. Correct what is wrong in {output}/proposals, and put the "
         f"results into {output}/labels.",
         out,
     )

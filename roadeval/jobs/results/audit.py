@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.config.run import RunConfig
+from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, ROAD, colours
 from roadeval.data.arrays import Image, Plane
 from roadeval.errors import RoadevalError
@@ -39,6 +39,8 @@ from roadeval.runtime.files import AnyPath, put, writing
 if TYPE_CHECKING:
     import pandas as pd
 
+PRESET: Final = "robust"
+"""A method that is often wrong finds few labels that are."""
 SUSPECTS: Final = "suspects"
 """The folder with a picture of each label that looks wrong."""
 
@@ -80,7 +82,7 @@ def audit(
     folder
         Where images, labels to correct, and pictures of what looks wrong land; nowhere by default.
     config
-        How a log is replayed.
+        How a log is replayed; by default with the preset `PRESET`.
     labels
         In which format the labels are written for correction: ``png`` or ``coco``.
     annotators
@@ -91,7 +93,7 @@ def audit(
     RoadevalError
         If there are no labels to look at, or the folder holds something else.
     """
-    path, config = Path(source), config or RunConfig()
+    path, config = Path(source), config or configure({"preset": PRESET})
     output = None if folder is None else Path(folder)
     if output and output.exists() and any(output.iterdir()):
         raise RoadevalError(f"{output}: is not empty; name a folder of its own")
@@ -105,10 +107,10 @@ def audit(
             _check_scale(drive.facts.run.get("frames", {}).get("scale", 1))
         frames = [frame for frame in drive.pictured if drive.truth(frame) is not None]
         if not frames:
-            raise RoadevalError(
-                f"{path}: no frame with truth and a picture: give --truth, or replay with "
-                "--record masks"
-            )
+            has_labels = drive.facts.frames.labelled
+            problem = "no labelled frame has a picture" if has_labels else "no frame has a label"
+            remedy = "replay with --record masks" if has_labels else "give labels with --truth"
+            raise RoadevalError(problem, where=path, remedy=remedy)
         blocks = np.array_split(frames, -(-len(frames) // BLOCK))
         tables = [find_suspects([_view(drive, int(frame)) for frame in block]) for block in blocks]
         suspects = rank_suspects(concatenate(tables), len(frames), count)
@@ -162,7 +164,7 @@ def _write_audit(
             frame, name = suspect["frame"], f"{suspect['stamp_ns']:019d}.png"
             image, truth = recording.image(frame), recording.truth(frame)
             proposals.append(Proposal(name, truth == ROAD, truth == IGNORE))
-            shown = f"{suspect['rank']:02d}_frame_{frame:04d}.png"
+            shown = f"{suspect['rank']:02d}_frame_{frame:04d}_{name}"
             (folder / IMAGES / name).write_bytes(png_of(image))
             (folder / SUSPECTS / shown).write_bytes(png_of(_mark(image, truth, suspect)))
         for name, content in proposal_files(proposals, labels).items():
@@ -181,7 +183,7 @@ def _write_audit(
 
 
 def _mark(image: Image, truth: Plane, suspect: Mapping[str, Any]) -> Image:
-    """Return an image with its road in green, edged yellow, and a red box around an area."""
+    """Return an image with its road in green, edged yellow, and an orange box around an area."""
     import cv2
 
     marked, road, square = image.copy(), truth == ROAD, np.ones((3, 3), np.uint8)
