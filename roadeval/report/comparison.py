@@ -226,7 +226,7 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         notes = [caption(name) for name in (unchanged, "regions left out") if name]
         yield Text(" ".join(filter(None, [legend, *notes])), "note")
     if comparison.classes:
-        yield Heading("Which class is the false road", 2)
+        yield Heading("What is taken for road", 2)
         columns = {
             "class": lambda row: row.name,
             "base %": lambda row: percent(row.base),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from itertools import islice
@@ -20,13 +19,8 @@ from roadeval.results.sentences import is_significant
 if TYPE_CHECKING:
     import pandas as pd
 
-_TIMES: Final = {
-    1000.0: ("raises", ""),
-    3.5: ("multiplies", " by {:.0f}"),
-    2.5: ("triples", ""),
-    1.75: ("doubles", ""),
-}
-"""Words for a rise, by the least ratio."""
+TIMES: Final = 1.5
+"""Least ratio of two error rates that a sentence tells as a ratio."""
 MOST: Final = 4
 """Most sentences about a variant."""
 
@@ -35,9 +29,11 @@ def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[
     """Return the sentences about each variant; none about one of which nothing is confirmed.
 
     They name the class of its false road and the class beside its missed road, the condition under
-    which it errs most, and the disturbance that harms it most. ``classes`` are the rows of the
-    table of that name.
+    which it errs most, and the disturbance that harms it most. Nothing is explained if truth or
+    masks do not fit the images. ``classes`` are the rows of the table of that name.
     """
+    if facts.misfits:
+        return {}
     variants = (name for name in facts.finals if name != BASELINE)
     sentences = {name: [*islice(_reasons(facts, classes, name), MOST)] for name in variants}
     return {name: reasons for name, reasons in sentences.items() if reasons}
@@ -47,16 +43,22 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
     """Yield what is confirmed about a variant: of its classes, its conditions, its disturbances."""
     rows = only(classes, variant=variant)
     for kind, sentence in describe_classes(rows, variant).items():
-        shares = by_class(rows).sort_values(kind, ascending=False, kind="stable")
-        numbers = shares["worst"].iloc[0].split() if isinstance(facts, Facts) else []
-        yield with_frames(sentence, numbers)
-    # A part of the image alone says less than a condition.
-    for confirmed in sorted(facts.slices.get(variant, []), key=lambda s: not s.conditions)[:1]:
+        yield with_frames(sentence, _worst_frames(rows, kind) if isinstance(facts, Facts) else [])
+    # That one part of the image is worse than the rest is told by its region.
+    conditional = (confirmed for confirmed in facts.slices.get(variant, []) if confirmed.conditions)
+    for confirmed in islice(conditional, 1):
         numbers = [] if confirmed.drives else [*map(str, confirmed.worst)]
         yield with_frames(describe_slice(confirmed), numbers)
     changes = facts.disturbances.get(variant, {})
     if any(is_significant(change.difference) for change in changes.values()):
         yield describe_disturbances({variant: changes}, variant)
+
+
+def _worst_frames(classes: pd.DataFrame, kind: str) -> list[str]:
+    """Return the frames with most false road of a class, or with most missed road."""
+    is_kind = classes["truth"] == ("other" if kind == "false" else "road")
+    wrong = classes["road"] if kind == "false" else classes["pixels"] - classes["road"]
+    return str(classes["worst"].iloc[wrong.where(is_kind, -1).to_numpy().argmax()]).split()
 
 
 def with_frames(sentence: str, numbers: list[str]) -> str:
@@ -73,6 +75,10 @@ NAMED: Final = 3
 """Most classes that a sentence names."""
 LEAST_WRONG: Final = 0.001
 """Less false road, or missed road, than this share of the pixels makes no sentence."""
+LEAST_SHARE: Final = 0.25
+"""No sentence is about a class with a smaller share of the false, or missed, road."""
+LEAST_OTHER: Final = 0.1
+"""A class with a smaller share is not named beside another."""
 
 
 def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
@@ -94,8 +100,11 @@ def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
         if wrong.sum() >= least:
             shares = by_class(rows)[kind].sort_values(ascending=False, kind="stable")
             (first, most), *others = shares.head(NAMED).items()
+            if most < LEAST_SHARE:
+                continue
             parts = [f"{percent(most, 0)} % of the {kind} road {verb} {first}"]
-            parts += [f"{percent(part, 0)} % {beside}{n}" for n, part in others if part >= 0.1]
+            named = [(name, part) for name, part in others if part >= LEAST_OTHER]
+            parts += [f"{percent(part, 0)} % {beside}{name}" for name, part in named]
             sentences[kind] = f"{', '.join(parts)}{over}."
     return sentences
 
@@ -177,16 +186,15 @@ def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
     if not disturbances:
         return ""
     variant = focus if focus in disturbances else next(iter(disturbances))
-    changes = [c for c in disturbances[variant].values() if c.difference.mean > 0]
-    if not changes:
+    changes = [change for change in disturbances[variant].values() if change.strength]
+    worse = [change for change in changes if change.difference.mean > 0]
+    if not worse:
         return f"No disturbance makes {variant} worse."
-    worst = max(changes, key=lambda change: change.difference.mean)
+    sure = [change for change in worse if is_significant(change.difference)]
+    worst = max(sure or worse, key=lambda change: change.difference.mean)
     base, error = worst.base_ERR or 0.0, worst.ERR or 0.0
-    times = error / base if base else math.inf
-    does, by = next((words for least, words in _TIMES.items() if times >= least), ("raises", ""))
-    ends = f"{percent(base, 1)} to {percent(error, 1)} %"
-    sure = sum(is_significant(change.difference) for change in changes)
-    makes = "makes" if sure == 1 else "make"
-    more = f" {sure} of {len(disturbances[variant])} {makes} it worse beyond chance."
-    most = f"{worst.text} {does} the ERR of {variant}{by.format(times)}: {ends}."
-    return f"{most}{more * bool(sure)}"
+    times = f" ({error / base:.2g} times as high)" if 0 < TIMES * base <= error else ""
+    ends = f"from {percent(base, 1)} to {percent(error, 1)} %"
+    others = f" {len(worse)} of {len(changes)} disturbances raise it, {len(sure)} beyond chance."
+    first = f"{worst.text} raises the ERR of {variant} {ends}{times}."
+    return f"{first}{others * (len(changes) > 1)}"

@@ -121,4 +121,4 @@ def test_a_fleet_from_before_classes_were_counted_has_none(fleet, tmp_path):
     old = shutil.copytree(fleet, tmp_path / "f")
     shutil.rmtree(old / "classes")
     assert Result(old).table("classes").empty
-    assert "Which class" not in write_report(old, tmp_path / "fleet.html").read_text()
+    assert "What is taken for road" not in write_report(old, tmp_path / "fleet.html").read_text()

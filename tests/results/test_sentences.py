@@ -125,14 +125,19 @@ def disturbed(*ends: float, p: float | None = None) -> dict[str, Degradation]:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        (disturbed(2.8, 5.9), "fog:1 doubles the ERR of net: 2.8 to 5.9 %."),
-        (disturbed(2, 2.2, 6), "fog:2 triples the ERR of net: 2.0 to 6.0 %."),
-        (disturbed(2, 9), "fog:1 multiplies the ERR of net by 4: 2.0 to 9.0 %."),
-        (disturbed(0, 9), "fog:1 raises the ERR of net: 0.0 to 9.0 %."),
+        (disturbed(2.8, 5.9), "fog:1 raises the ERR of net from 2.8 to 5.9 % (2.1 times as high)."),
+        (disturbed(2, 2.2), "fog:1 raises the ERR of net from 2.0 to 2.2 %."),
+        (
+            disturbed(2, 6, 1),
+            "fog:1 raises the ERR of net from 2.0 to 6.0 % (3 times as high). 1 of 2 disturbances "
+            "raise it, 0 beyond chance.",
+        ),
+        (disturbed(0, 9), "fog:1 raises the ERR of net from 0.0 to 9.0 %."),
         (disturbed(2, 1.9), "No disturbance makes net worse."),
         (
             disturbed(2, 3, 3.2, p=0.001),
-            "fog:2 raises the ERR of net: 2.0 to 3.2 %. 2 of 2 make it worse beyond chance.",
+            "fog:2 raises the ERR of net from 2.0 to 3.2 % (1.6 times as high). "
+            "2 of 2 disturbances raise it, 2 beyond chance.",
         ),
     ],
 )

@@ -17,7 +17,7 @@ SURE = replace(a_difference(3, 1, 5), p_holm=0.002, comparisons=2)
 FOG = {"fog-2": Degradation("fog", 2, 0.05, 0.02, SURE)}
 CLASSES = pd.DataFrame(
     [
-        ("road", "road", 9000, 8000, 0, ""),
+        ("road", "road", 9000, 8000, 0, "8 12"),
         ("pavement", "other", 5000, 900, 600, "50 3"),
         ("car", "other", 4000, 300, 400, "9"),
     ],
@@ -35,12 +35,19 @@ def test_at_most_four_sentences_name_class_condition_and_disturbance_with_their_
     assert explain(FACTS, CLASSES) == {
         "mine": [
             "75 % of the false road is pavement, 25 % car; see frames 50, 3.",
-            "60 % of the missed road lies beside pavement, 40 % beside car; see frames 50, 3.",
+            "60 % of the missed road lies beside pavement, 40 % beside car; see frames 8, 12.",
             "In frames with more than 30 % shade, ERR is 3.0 times the rest (2.0 to 4.0); "
             "see frames 7, 21.",
-            "fog:2 triples the ERR of mine: 2.0 to 5.0 %. 1 of 1 makes it worse beyond chance.",
+            "fog:2 raises the ERR of mine from 2.0 to 5.0 % (2.5 times as high).",
         ]
     }
+
+
+def test_masks_or_truth_that_do_not_fit_explain_enough_and_a_part_of_the_image_is_no_reason():
+    assert explain(replace(FACTS, misfits=["The truth is late."]), CLASSES) == {}
+    of_rows = replace(SHADE, conditions=[], part="rows_40-60")
+    facts = replace(FACTS, slices={"mine": [of_rows]}, disturbances={})
+    assert explain(facts, NO_CLASSES) == {}
 
 
 def test_what_may_be_chance_and_what_is_rare_is_no_reason():

@@ -30,7 +30,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
         return
     by_variant = {name: by_class(only(rows, variant=name)) for name in names}
     of_focus, parts = by_variant[focus], pd.concat(by_variant, names=["variant"])
-    yield Heading("Which class is the false road")
+    yield Heading("What is taken for road")
     if sentence := " ".join(describe_classes(rows, focus).values()):
         yield Text(f"{focus}: {sentence}")
     is_other = of_focus["truth"] == "other"

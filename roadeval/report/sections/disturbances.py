@@ -23,7 +23,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     facts = findings.facts
     if not facts.disturbances:
         return
-    yield Heading("How it stands disturbances")
+    yield Heading("Fog, darkness and other disturbances")
     yield Text(describe_disturbances(facts.disturbances, facts.focus))
     by_variant, columns = looks([*facts.finals]), errors_by_variant(facts)
     names = [*next(iter(columns.values()))]

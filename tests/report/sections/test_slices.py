@@ -37,7 +37,7 @@ def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
 
 @pytest.mark.parametrize(
     ("frames", "slices", "begin"),
-    [(90, {"filtered": []}, "Nothing that holds on the other half"), (39, {}, "Too little")],
+    [(90, {"filtered": []}, "Nothing is confirmed."), (39, {}, "Too little")],
 )
 def test_where_no_slice_holds_a_sentence_says_so(frames, slices, begin):
     heading, sentence = blocks(frames, **slices)
