@@ -115,8 +115,8 @@ def _degradations(
         mean = [change.mean for change in part["difference"]]
         over = over_drives(part.assign(mean=mean, group=part["drive"].map(groups)), confidence)
         error, base = map(float, part[["ERR", "base_ERR"]].astype(float).mean())
-        first = part.iloc[0]
-        means[names] = Degradation(first["kind"], first["strength"], error, base, over)
+        kind, strength = part.iloc[0][["kind", "strength"]]
+        means[names] = Degradation(kind, strength, error, base, over)
     return as_corrected(means)
 
 
@@ -145,8 +145,8 @@ def _slices(
         hour=hours.where((stamps > CENTURY_NS) & (stamps < 4 * CENTURY_NS)),
         group=conditions["drive"].map(groups).astype("str"),
     ).astype({"drive": "str"})
-    tags = [name for name in map(str, drives) if name.startswith(TAG)]
-    conditions = conditions.merge(drives[["drive", *tags]].astype({"drive": "str"}), on="drive")
+    tags = drives.filter(regex=f"^(drive$|{TAG})").astype({"drive": "str"})
+    conditions = conditions.merge(tags, on="drive")
     parts = parts.assign(wrong=parts["FP"] + parts["FN"])
     parts = parts[parts["region"].astype("str").str.match(r"band_|\d")]
     return {

@@ -75,10 +75,11 @@ def curvature(truth: Truth) -> float:
     return float(abs(between - (far + near) / 2)) / road.shape[1]
 
 
-def parts_of(result: FrameResult) -> Iterator[tuple[str, str, int, int]]:
-    """Yield variant and name of each part of a frame's pixels, how many are wrong, and how many.
+def parts_of(result: FrameResult) -> Iterator[tuple[str, str | int, int, int]]:
+    """Yield variant and part of a frame's pixels, how many are wrong, and how many are labelled.
 
-    Parts are image rows, distances and sides; they are of final masks.
+    Parts of final masks are image rows, distances, sides, and classes, by their codes; of a class
+    it is how many are called road.
     """
     for tally in {tally.variant: tally for tally in result.tallies}.values():
         for name, counts in tally.regions.items():
@@ -91,6 +92,9 @@ def parts_of(result: FrameResult) -> Iterator[tuple[str, str, int, int]]:
                 np.count_nonzero(half & bits == code) for bits, code in ((6, FP), (4, IGNORED))
             )
             yield variant, name, int(wrong), int(half.size - ignored)
+    for variant, by_class in result.classes.items():
+        for code in np.flatnonzero(by_class[:NO_CLASS, 0]).tolist():
+            yield variant, code, int(by_class[code, 1]), int(by_class[code, 0])
 
 
 class FrameConditions:
@@ -98,8 +102,7 @@ class FrameConditions:
 
     def __init__(self) -> None:
         self._moments, self._values = array("q"), array("d")
-        self._parts: defaultdict[tuple[str, str], array[int]] = defaultdict(lambda: array("q"))
-        self._classes: defaultdict[tuple[str, int], array[int]] = defaultdict(lambda: array("q"))
+        self._parts: dict[tuple[str, str | int], array[int]] = defaultdict(lambda: array("q"))
         self._before: Plane | None = None
 
     def add(self, result: FrameResult) -> None:
@@ -127,10 +130,6 @@ class FrameConditions:
         self._values.extend(round(values[name], DIGITS) for name in QUANTITIES)
         for variant, name, wrong, pixels in parts_of(result):
             self._parts[variant, name].extend((result.frame.number, wrong, pixels))
-        for variant, by_class in result.classes.items():
-            for code in np.flatnonzero(by_class[:NO_CLASS, 0]).tolist():
-                pixels, road, _ = by_class[code].tolist()
-                self._classes[variant, code].extend((result.frame.number, road, pixels))
 
     def interrupt(self) -> None:
         """Note that the next frame does not follow the one before."""
@@ -157,18 +156,15 @@ class FrameConditions:
         """
         import pandas as pd
 
-        columns = ["frame", "wrong", "N"]
-        tables = [
-            pd.DataFrame(np.reshape(rows, (-1, 3)), columns=columns).assign(region=name)
-            for (of, name), rows in self._parts.items()
-            if of == variant
-        ]
-        for code, label in enumerate(classes):
-            rows = np.reshape(self._classes.get((variant, code), ()), (-1, 3))
-            if label.truth != "ignored" and len(rows):
-                part = pd.DataFrame(rows, columns=columns, dtype=np.int64)
-                if label.truth == "road":
-                    part["wrong"] = part["N"] - part["wrong"]
-                name = label.name or f"class {label.value}"
-                tables.append(part.assign(region=f"{ON_CLASS}{name}"))
+        columns, tables = ["frame", "wrong", "N"], []
+        for (of, part), numbers in self._parts.items():
+            name, truth = part, "other"
+            if isinstance(part, int):
+                value, name, truth = classes[part] if classes else (0, "", "ignored")
+                name = f"{ON_CLASS}{name or f'class {value}'}"
+            if of == variant and truth != "ignored":
+                rows = pd.DataFrame(np.reshape(numbers, (-1, 3)), columns=columns)
+                if truth == "road":
+                    rows["wrong"] = rows["N"] - rows["wrong"]
+                tables.append(rows.assign(region=name))
         return pd.concat(tables) if tables else pd.DataFrame(columns=[*columns, "region"])

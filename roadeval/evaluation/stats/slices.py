@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from roadeval.data.arrays import Flags, Floats
+from roadeval.data.arrays import Flags, Floats, Places
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference, holm, p_value
 
@@ -130,22 +130,21 @@ def find_slices(
     on = ["drive", "camera", "frame"]
     columns = [name for name in map(str, conditions) if name not in (*on, "stamp_ns", "group")]
     words = dict.fromkeys(on[:2], "str")
-    table = frames.loc[frames["N"] > 0, [*on, "stamp_ns", "FP", "FN", "N"]].astype(words)
-    table = table.merge(conditions.drop(columns="stamp_ns").astype(words), on=on)
-    counts = {"": np.column_stack((table["FP"] + table["FN"], table["N"])).astype(float)}
-    share = np.ones((len(table), 1))
-    if over_drives:  # every drive counts the same
-        share = 1 / table.groupby("drive")["N"].transform("sum").to_numpy(float)[:, None]
+    table = frames.loc[frames["N"] > 0, [*on, "FP", "FN", "N"]].astype(words)
+    table = table.merge(conditions.astype(words), on=on)
+    pixels = {"": np.array([table["FP"] + table["FN"], table["N"]], float)}
     if len(parts):
         values = parts.astype({**words, "region": "str"})
         wide = values.pivot_table(["wrong", "N"], on, "region", "sum")
         wide = wide.reindex(pd.MultiIndex.from_frame(table[on])).fillna(0)
         for part, regions in _parts([*map(str, wide.columns.unique(1))]).items():
-            pairs = [wide[name][regions].to_numpy(float).sum(axis=1) for name in ("wrong", "N")]
-            counts[part] = np.column_stack(pairs)
-    counts = {part: pixels * share for part, pixels in counts.items()}
-    search = _Search(table, columns, counts, "drives" if over_drives else "frames")
-    return search.slices(confidence) if search.enough else []
+            sums = [wide[n][regions].to_numpy(float).sum(axis=1) for n in ("wrong", "N")]
+            pixels[part] = np.array(sums)
+    if over_drives:  # every drive counts the same
+        of_drive = table.groupby("drive")["N"].transform("sum").to_numpy(float)
+        pixels = {part: counts * (1 / of_drive) for part, counts in pixels.items()}
+    search = _Search(table, columns, pixels, "drives" if over_drives else "frames")
+    return search.slices(confidence)
 
 
 def _parts(regions: Collection[str]) -> dict[str, list[str]]:
@@ -164,56 +163,59 @@ def _parts(regions: Collection[str]) -> dict[str, list[str]]:
 
 
 class _Search:
-    """The frames of a mask with their conditions, and their counts by part, ``(n, 2)`` each."""
+    """The frames of a mask with their conditions, and wrong and labelled ``pixels`` by part.
+
+    These are ``(2, n)``. ``sides`` are ``(4, ..., units)``: wrong pixels inside and outside, and
+    labelled ones inside and outside, by frame, stretch, drive or group.
+    """
 
     def __init__(
-        self, table: pd.DataFrame, columns: Sequence[str], counts: Mapping[str, Floats], unit: Unit
+        self, table: pd.DataFrame, columns: Sequence[str], pixels: Mapping[str, Floats], unit: Unit
     ) -> None:
-        self._table, self._columns, self._counts, self._unit = table, columns, counts, unit
-        self.enough, count = False, len(table)
-        self._block = np.zeros(count, np.int64)
+        self._table, self._columns, self._pixels, self._unit = table, columns, pixels, unit
+        self._frames = self._units = np.arange(len(table))
         if unit == "drives":
-            self._block = table["group"].factorize()[0]
-            self._drive = table["drive"].factorize()[0]
-            self.enough = len(np.unique(self._block)) >= 2 * LEAST_GROUPS
-        elif count >= LEAST_FRAMES:
-            wrong, pixels = counts[""].T
-            independent = mean_distribution(wrong / pixels).effective
+            self._units, self._block = (table[n].factorize()[0] for n in ("drive", "group"))
+            self._enough = table["group"].nunique() >= 2 * LEAST_GROUPS
+        elif len(table) < LEAST_FRAMES:
+            self._block, self._enough = self._frames, False
+        else:
+            wrong, labelled = pixels[""]
+            independent = mean_distribution(wrong / labelled).effective
             blocks = 2 * int(np.clip(independent / (2 * INDEPENDENT), 1, BLOCKS // 2))
-            self._block = np.arange(count) * blocks // count
-            self.enough = independent >= INDEPENDENT
+            self._block, self._enough = self._stretches(blocks), independent >= INDEPENDENT
         self._searching = self._block % 2 == 0
 
-    def slices(self, confidence: float) -> list[Slice]:
-        """Return the slices that are found and confirmed."""
-        conditions = [*self._conditions()]
-        meets = np.array([np.ones(len(self._table), bool), *(flags for _, flags in conditions)])
-        family, chosen = [], [*self._choose(meets)]
-        for flags, part, _ in chosen:
-            p, ratio = self._test(flags, part, ~self._searching)
-            count = int((flags & ~self._searching).sum())
-            family.append(Difference(math.log(ratio), None, None, p, confidence, self._unit, count))
-        slices = []
-        for (flags, part, places), tested in zip(chosen, holm(family), strict=True):
-            ratio, p_holm = math.exp(tested.mean), tested.p_holm
-            if p_holm is None or p_holm >= 1 - confidence or ratio < LEAST_RATIO:
-                continue
-            sums = self._sums(flags, part, ~self._searching)
-            inside, outside = (float(side[:, 0].sum() / side[:, 1].sum()) for side in sums)
-            low, high = self._interval(*sums, ratio, confidence)
-            of = [conditions[place - 1][0] for place in places if place]
-            worst_frames, drives = self._worst(flags, part)
-            slices.append(
-                Slice(
-                    *(of, part, tested.units, inside, outside, ratio, low, high, p_holm),
-                    worst_frames,
-                    drives,
-                )
-            )
-        return sorted(slices, key=lambda failure: -failure.ratio)
+    def _stretches(self, count: int) -> Places:
+        """Return each frame's number among so many stretches of equal length."""
+        return self._frames * count // len(self._frames)
 
-    def _conditions(self) -> Iterator[tuple[Condition, Flags]]:
-        """Yield conditions, and whether each frame meets them."""
+    def slices(self, confidence: float) -> list[Slice]:
+        """Return the slices of the searching half that the other half confirms."""
+        if not self._enough:
+            return []
+        conditions, flags_by_condition = zip(*self._conditions(), strict=True)
+        chosen = [*self._choose(np.array(flags_by_condition))]
+        tests = [self._test(flags, part, ~self._searching) for flags, part, _ in chosen]
+        family = [Difference(math.nan, None, None, p, confidence, self._unit, 0) for p, _ in tests]
+        slices = []
+        for (flags, part, places), (_, sides), tested in zip(
+            chosen, tests, holm(family), strict=True
+        ):
+            p = tested.p_holm
+            if p is None or p >= 1 - confidence or _ratios(sides) < LEAST_RATIO:
+                continue
+            of = [c for place in places if (c := conditions[place])]
+            frames = int((flags & ~self._searching).sum())
+            wrong, rest, labelled, rest_labelled = sides.sum(axis=-1).tolist()
+            rates, ratio = (wrong / labelled, rest / rest_labelled), float(_ratios(sides))
+            ends, worst = self._interval(sides, ratio, confidence), self._worst(flags, part)
+            slices.append(Slice(of, part, frames, *rates, ratio, *ends, p, *worst))
+        return sorted(slices, key=lambda confirmed: -confirmed.ratio)
+
+    def _conditions(self) -> Iterator[tuple[Condition | None, Flags]]:
+        """Yield None, which all frames meet, and conditions, each with whether a frame meets it."""
+        yield None, np.ones(len(self._table), bool)
         for name in self._columns:
             column = self._table[name]
             if column.dtype.kind not in "fiu":
@@ -221,8 +223,8 @@ class _Search:
                     yield Condition(name, "is", str(word)), (column == word).to_numpy(bool)
                 continue
             values = column.to_numpy(float)
-            known = values[self._searching & np.isfinite(values)]
-            limits = np.quantile(known, QUANTILES) if len(known) else ()
+            measured = values[self._searching & np.isfinite(values)]
+            limits = np.quantile(measured, QUANTILES) if len(measured) else ()
             for limit in dict.fromkeys(float(f"{limit:.2g}") for limit in limits):
                 yield Condition(name, ">", limit), values > limit
                 yield Condition(name, "<", limit), values < limit
@@ -231,166 +233,144 @@ class _Search:
         """Yield the clearest slices of the searching half: flags, part and conditions' places."""
         scores, ratios = self._score(meets, "")
         of_frames: list[tuple[float, str, tuple[int, ...]]]
-        of_frames = [(scores[place], "", (place,)) for place in range(len(meets))]
+        of_frames = [(score, "", (place,)) for place, score in enumerate(scores.tolist())]
         of_parts = []
         for first in np.argsort(-scores, kind="stable")[:BEST].tolist():
             both, both_ratios = self._score(meets & meets[first], "")
             better = np.flatnonzero(both_ratios >= GAIN * np.maximum(ratios, ratios[first]))
             of_frames += [(both[place], "", (first, place)) for place in better.tolist()]
-        for part in [*self._counts][1:]:
+        for part in [*self._pixels][1:]:
             both, both_ratios = self._score(meets, part)
             better = both_ratios >= GAIN * np.maximum(ratios, both_ratios[0])
-            places = np.flatnonzero(better).tolist()
-            places += [0] * (not part.startswith(ON_CLASS))  # the table of classes tells it
-            of_parts += [(both[place], part, (place,)) for place in places]
+            better[0] = not part.startswith(ON_CLASS)  # the table of classes tells it
+            of_parts += [(both[place], part, (place,)) for place in np.flatnonzero(better).tolist()]
         for candidates in (of_frames, of_parts):
             taken: list[tuple[Flags, str]] = []
-            ranked = sorted(candidates, key=lambda candidate: -candidate[0])
-            for score, part, conditions in ranked[:TRIED]:
+            for score, part, places in sorted(candidates, key=lambda c: -c[0])[:TRIED]:
                 if score <= 0 or len(taken) == TESTED_SLICES:
                     break
-                flags: Flags = np.logical_and.reduce(meets[[*conditions]])
-                if any(part == other and _share(flags, f) > OVERLAP for f, other in taken):
+                flags: Flags = np.logical_and.reduce(meets[[*places]])
+                if any(
+                    part == other and (flags & others).sum() > OVERLAP * (flags | others).sum()
+                    for others, other in taken
+                ):
                     continue
-                p_searched, ratio = self._test(flags, part, self._searching)
-                if p_searched <= SURE and ratio >= LEAST_RATIO:
+                p, sides = self._test(flags, part, self._searching)
+                if p <= SURE and _ratios(sides) >= LEAST_RATIO:
                     taken.append((flags, part))
-                    yield flags, part, conditions
+                    yield flags, part, places
 
     def _score(self, meets: Flags, part: str) -> tuple[Floats, Floats]:
         """Return a quick score, and the ratio, of each row of flags on the searching half.
 
         Both are 0 if the slice, or the rest, is too small, or errs less than the rest.
         """
-        rows = self._searching
-        units = self._drive if self._unit == "drives" else np.arange(len(rows)) * 40 // len(rows)
-        starts = np.flatnonzero(np.diff(units[rows], prepend=-1))
-        flags, (wrong, pixels) = meets[:, rows], self._counts[part][rows].T
-        errors, labelled = (np.add.reduceat(flags * c, starts, axis=1) for c in (wrong, pixels))
-        rest, rest_labelled = (
-            np.add.reduceat(c, starts) - sums
-            for c, sums in zip(self._counts[""][rows].T, (errors, labelled), strict=True)
-        )
-        if self._unit == "drives":
-            errors, labelled, rest, rest_labelled = _within_drives(
-                errors, labelled, rest, rest_labelled
-            )
-        common = (errors + rest).sum(axis=1) / (labelled + rest_labelled).sum(axis=1)
+        units = self._units if self._unit == "drives" else self._stretches(40)
+        sides = self._sides(meets, part, self._searching, units)
         with np.errstate(divide="ignore", invalid="ignore"):
-            series = (errors - common[:, None] * labelled) / labelled.sum(axis=1, keepdims=True)
-            series -= (rest - common[:, None] * rest_labelled) / rest_labelled.sum(
-                axis=1, keepdims=True
-            )
+            series, ratios = _contributions(sides)[0], _ratios(sides)
             scores = series.sum(axis=1) / np.sqrt((series**2).sum(axis=1))
-            ratios = errors.sum(axis=1) / labelled.sum(axis=1)
-            ratios /= rest.sum(axis=1) / rest_labelled.sum(axis=1)
         usable = np.isfinite(scores) & np.isfinite(ratios) & (ratios > 1)
         return np.where(usable, scores, 0), np.where(usable, ratios, 0)
 
-    def _sums(self, flags: Flags, part: str, rows: Flags) -> tuple[Floats, Floats]:
-        """Return wrong and labelled pixels inside and outside, by frame or group of a half."""
-        inside = np.where(flags[rows, None], self._counts[part][rows], 0)
-        outside = self._counts[""][rows] - inside
-        if self._unit == "frames":
-            return inside, outside
-        _, first, drive = np.unique(self._drive[rows], return_index=True, return_inverse=True)
-        sums: list[Floats] = [np.bincount(drive, c).astype(float) for c in (*inside.T, *outside.T)]
-        group = np.unique(self._block[rows][first], return_inverse=True)[1]
-        counts = np.array([np.bincount(group, column) for column in _within_drives(*sums)])
-        counts = counts[:, (counts[1] > 0) | (counts[3] > 0)].T
-        return counts[:, :2], counts[:, 2:]
+    def _sides(self, flags: Flags, part: str, rows: Flags, units: Places, of: str = "") -> Floats:
+        """Return the pixels inside, of ``part`` where ``flags`` are set, and all others of ``of``.
 
-    def _test(self, flags: Flags, part: str, rows: Flags) -> tuple[float, float]:
-        """Return the p-value of a slice on a half, and its ratio; 1 and 1 if it is too small."""
-        pairs = [self._sums(flags, part, rows)]
+        Of drives they are weighted, see `_within_drives`.
+        """
+        starts = np.flatnonzero(np.diff(units[rows], prepend=-1))
+        sides = []
+        for pixels, everywhere in zip(self._pixels[part], self._pixels[of], strict=True):
+            inside = flags[..., rows] * pixels[rows]
+            outside = everywhere[rows] - inside
+            sides += [np.add.reduceat(side, starts, axis=-1) for side in (inside, outside)]
+        return _within_drives(*sides) if self._unit == "drives" else np.array(sides)
+
+    def _test(self, flags: Flags, part: str, rows: Flags) -> tuple[float, Floats]:
+        """Return the p-value of a slice on a half, 1 if it is too small, and its sides."""
+        sides = self._sides(flags, part, rows, self._units)
+        if self._unit == "drives":
+            first = np.flatnonzero(np.diff(self._units[rows], prepend=-1))
+            sides = np.array([np.bincount(self._block[rows][first], side) for side in sides])
+            sides = sides[:, (sides[2] > 0) | (sides[3] > 0)]
+        comparisons = [sides]
         if part and self._unit == "frames" and not flags[rows].all():
-            counts, beside = (
-                self._counts[part][rows],
-                self._counts[""][rows] - self._counts[part][rows],
-            )
-            there, seen = flags[rows], counts[:, 1] > 0
-            pairs.append((counts[there], beside[there]))
-            pairs.append((counts[seen] * there[seen, None], counts[seen] * ~there[seen, None]))
-        p, ratios = 0.0, []
-        for inside, outside in pairs:
-            units = min((side[:, 1] > 0).sum() for side in (inside, outside))
-            if (
-                units < LEAST_INSIDE[self._unit]
-                or not inside[:, 0].sum()
-                or not outside[:, 0].sum()
-            ):
-                return 1.0, 1.0
-            p = max(p, _p_value(inside, outside, self._unit))
-            (wrong, pixels), (wrong_outside, rest) = inside.sum(axis=0), outside.sum(axis=0)
-            ratios.append(float(wrong / pixels / (wrong_outside / rest)))
-        return (p, ratios[0]) if min(ratios) > 1 else (1.0, 1.0)
+            seen = rows & (self._pixels[part][1] > 0)
+            comparisons.append(self._sides(flags, part, rows & flags, self._units))
+            comparisons.append(self._sides(flags, part, seen, self._units, part))
+        for wrong, rest, labelled, rest_labelled in comparisons:
+            least = min((labelled > 0).sum(), (rest_labelled > 0).sum())
+            if least < LEAST_INSIDE[self._unit] or not wrong.any() or not rest.any():
+                return 1.0, sides
+        if min(map(_ratios, comparisons)) <= 1:
+            return 1.0, sides
+        return max(_p_value(compared, self._unit) for compared in comparisons), sides
 
-    def _interval(
-        self, inside: Floats, outside: Floats, ratio: float, confidence: float
-    ) -> tuple[float, float]:
+    def _interval(self, sides: Floats, ratio: float, confidence: float) -> tuple[float, float]:
         """Return the least and the greatest ratio that is not rejected, to half a percent."""
         ends = []
         for end in (1.0, 20 * ratio):
             near, far = ratio, end
             while abs(math.log(far / near)) > 0.005:
                 middle = math.sqrt(near * far)
-                rejected = _p_value(inside, outside, self._unit, middle) < 1 - confidence
+                rejected = _p_value(sides, self._unit, middle) < 1 - confidence
                 near, far = (near, middle) if rejected else (middle, far)
             ends.append(near)
         return ends[0], ends[1]
 
     def _worst(self, flags: Flags, part: str) -> tuple[list[int], list[str]]:
         """Return the frames with the highest ERR inside; and their drives, if there are several."""
-        wrong, pixels = self._counts[part].T
-        rates = np.divide(wrong, pixels, out=np.zeros(len(wrong)), where=pixels > 0)
-        scene = np.arange(len(wrong)) * SCENES // len(wrong)
+        wrong, labelled = self._pixels[part]
+        rates = np.divide(wrong, labelled, out=np.zeros(len(wrong)), where=labelled > 0)
         of_drives = self._unit == "drives"
-        rows = self._table.assign(error=rates, scene=self._block if of_drives else scene)[flags]
+        scene = self._block if of_drives else self._stretches(SCENES)
+        rows = self._table.assign(error=rates, scene=scene)[flags]
         rows = rows.sort_values("error", ascending=False, kind="stable")
         rows = rows.drop_duplicates("scene")[:SHOWN]
         return rows["frame"].tolist(), rows["drive"].tolist() if of_drives else []
 
 
-def _within_drives(
-    wrong: Floats, pixels: Floats, rest: Floats, rest_pixels: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return wrong and labelled pixels inside and outside, ``(..., drives)``, weighted.
+def _within_drives(wrong: Floats, rest: Floats, labelled: Floats, rest_labelled: Floats) -> Floats:
+    """Return sides by drive, weighted.
 
     The weights are those of Mantel and Haenszel, so that each drive is compared with itself. What
     no drive has both inside and outside, as a tag, is compared between drives, without weights.
     """
-    both = pixels + rest_pixels
-    weights = pixels * rest_pixels / both
-    alone = weights.sum(axis=-1, keepdims=True) == 0
-    return (
-        np.where(alone, wrong, wrong * rest_pixels / both),
-        np.where(alone, pixels, weights),
-        np.where(alone, rest, rest * pixels / both),
-        np.where(alone, rest_pixels, weights),
-    )
+    sides, both = np.array([wrong, rest, labelled, rest_labelled]), labelled + rest_labelled
+    weighted = sides * [rest_labelled, labelled, rest_labelled, labelled] / both
+    alone = weighted[2].sum(axis=-1, keepdims=True) == 0
+    return np.where(alone, sides, weighted)
 
 
-def _p_value(inside: Floats, outside: Floats, unit: Unit, ratio: float = 1.0) -> float:
-    """Return the p-value of a ratio of ERR inside to outside, from pixels by unit, ``(n, 2)``."""
-    (wrong, pixels), (rest, rest_pixels) = inside.T, outside.T
-    shares, rest_shares = pixels / pixels.sum(), rest_pixels / rest_pixels.sum()
+def _ratios(sides: Floats) -> Floats:
+    """Return ERR inside divided by ERR outside."""
+    wrong, rest, labelled, rest_labelled = sides.sum(axis=-1)
+    ratios: Floats = wrong / labelled / (rest / rest_labelled)
+    return ratios
+
+
+def _contributions(sides: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the units' contributions to the difference of ERR, their factors, and ERR of all."""
+    wrong, rest, labelled, rest_labelled = sides
+    *_, inside, outside = sides.sum(axis=-1, keepdims=True)
+    common = (wrong + rest).sum(axis=-1, keepdims=True) / (inside + outside)
+    factors = labelled / inside - rest_labelled / outside
+    series = wrong / inside - rest / outside - common * factors
+    return series * (series.shape[-1] / common), factors, common
+
+
+def _p_value(sides: Floats, unit: Unit, ratio: float = 1.0) -> float:
+    """Return the p-value of a ratio of ERR inside to outside."""
+    away = math.log(_ratios(sides) / ratio)
+    modelled = ratio if unit == "drives" else ratio * math.exp(away / 2)
+    sides = np.array([sides[0] / modelled, *sides[1:]])
+    series, factors, common = _contributions(sides)
     if unit == "drives":
-        wrong = wrong / ratio
-    else:
-        away = math.log(wrong.sum() / pixels.sum() / (rest.sum() / rest_pixels.sum()) / ratio)
-        wrong = wrong / (ratio * math.exp(away / 2))
-    common = (wrong + rest).sum() / (pixels + rest_pixels).sum()
-    if unit == "frames" and not (pixels * rest_pixels).any():  # whole frames
-        errors = (wrong + rest) / (pixels + rest_pixels) / common
-        mean = mean_distribution(errors, factors=shares - rest_shares)
-        return mean._replace(mean=away).p_value()
-    series = wrong / pixels.sum() - rest / rest_pixels.sum() - common * (shares - rest_shares)
-    series *= len(series) / common
-    if unit == "frames":
-        return mean_distribution(series)._replace(mean=away).p_value()
-    return p_value(series, unit)
-
-
-def _share(one: Flags, other: Flags) -> float:
-    """Return the share of frames in either that are in both."""
-    return float((one & other).sum() / max((one | other).sum(), 1))
+        return p_value(series, unit)
+    wrong, rest, labelled, rest_labelled = sides
+    if (labelled * rest_labelled).any():
+        mean = mean_distribution(series)
+    else:  # whole frames
+        errors = (wrong + rest) / (labelled + rest_labelled) / common
+        mean = mean_distribution(errors, factors=factors)
+    return mean._replace(mean=away).p_value()
