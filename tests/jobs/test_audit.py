@@ -123,7 +123,9 @@ def test_the_wrong_labels_are_written_with_pictures_and_the_line_to_tell(
     assert found.sentences[0] == "The labels of 5 frames look wrong: 3, 7, 12, 17, 21."
     table = json.loads((folder / "audit.json").read_text())["suspects"]
     pictures = sorted(picture.name for picture in (folder / "suspects").iterdir())
-    assert pictures == [f"{row['rank']:02d}_frame_{row['frame']:04d}.png" for row in table]
+    assert pictures == [
+        f"{row['rank']:02d}_frame_{row['frame']:04d}_{row['stamp_ns']:019d}.png" for row in table
+    ]
     images = {image.name for image in (folder / "images").iterdir()}
     assert images == {f"{row['stamp_ns']:019d}.png" for row in table}
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import onnxruntime
+import pytest
 
 from benchmarks.disturbances import HEIGHT, TITLES, WIDTH, falls, table, write_network
 from roadeval.data import Frame
@@ -10,6 +11,7 @@ from tests.evaluation.making import a_difference
 from tests.fixtures.drives import scene
 
 
+@pytest.mark.filterwarnings("ignore:Stochastic Optimizer")  # a rough network is enough
 def test_its_network_finds_the_road_that_it_has_learnt(tmp_path):
     frames = [Frame(n, n, n, scene(n)[0], b"", truth=scene(n)[1]) for n in range(0, 12, 4)]
     net = onnxruntime.InferenceSession(write_network(tmp_path / "net.onnx", frames))
