@@ -199,13 +199,13 @@ class Disturbance(NamedTuple):
     @classmethod
     def parse(cls, text: str) -> Disturbance:
         """Read ``KIND:STRENGTH``; a `SettingError` with what is allowed if it is none."""
-        kind, _, number = text.strip().partition(":")
+        kind, _, number = text.strip().lower().partition(":")
         if (allowed := KINDS.get(kind)) is None:
             remedy = f"{likely(kind, KINDS)}choose {', '.join(KINDS)} (as fog:2)"
             raise SettingError(f"there is no disturbance {kind!r}", remedy=remedy)
         is_number = re.fullmatch(r"[+-]?\d{1,3}(\.\d{1,3})?", number)
         if not is_number or not allowed.least <= float(number) <= allowed.most:
-            ends = f"from {allowed.least:g} to {allowed.most:g} ({allowed.title})"
+            ends = f"from {allowed.least:g} to {allowed.most:g} ({allowed.title}), as {kind}:2"
             raise SettingError(f"{text!r}: the strength of {kind} must be {ends}")
         return cls(kind, float(number) + 0.0)
 

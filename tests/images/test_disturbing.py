@@ -131,6 +131,7 @@ def test_the_ground_is_near_at_the_bottom_and_nothing_is_known_of_roofs():
     ("text", "name", "shown"),
     [
         ("fog:2", "fog-2", "fog:2"),
+        ("FOG:2", "fog-2", "fog:2"),
         ("blur:0.50", "blur-0_5", "blur:0.5"),
         ("exposure:+1", "exposure-plus1", "exposure:+1"),
         ("exposure:-0.5", "exposure-minus0_5", "exposure:-0.5"),

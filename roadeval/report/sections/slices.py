@@ -23,15 +23,17 @@ def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[
     facts, of_fleet = findings.facts, isinstance(findings, FleetFolder)
     slices = facts.slices.get(facts.focus or "")
     if isinstance(findings, FleetFolder):
-        scored = sum(findings.facts.counts.get(status, 0) for status in (SCORED, DAMAGED))
-        names, unit, few = findings.names, "drives", scored < 2 * LEAST_GROUPS
+        drives = findings.drives
+        scored = drives[drives["status"].isin([SCORED, DAMAGED])]
+        groups = scored["group"].fillna(scored["log_digest"]).nunique()
+        names, unit, few = findings.names, "drives", groups < 2 * LEAST_GROUPS
     else:
         names, unit, few = {}, "drive", findings.facts.frames.evaluated < LEAST_FRAMES
     if facts.focus is None or (slices is None and not few):
         return
     yield Heading("When it fails", level)
     if not slices:
-        least = f"{2 * LEAST_GROUPS} drives" if of_fleet else f"{LEAST_FRAMES} frames"
+        least = f"{2 * LEAST_GROUPS} groups of drives" if of_fleet else f"{LEAST_FRAMES} frames"
         name = "no slices" if slices is not None else "too little for slices"
         yield Text(caption(name, variant=facts.focus, unit=unit, least=least))
         return

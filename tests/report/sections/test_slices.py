@@ -9,7 +9,10 @@ from roadeval.evaluation.stats.slices import Condition, Slice
 from roadeval.report.blocks import Heading, LinkList, Table, Text
 from roadeval.report.sections.slices import when_it_fails
 from roadeval.results.facts import Facts, FrameAccount
+from roadeval.results.fleet import FleetFolder
+from roadeval.results.schema import SCORED
 from tests.report.making import plain_rows, some_findings, the
+from tests.results.fleet.making import fleet_of
 from tests.results.making import facts_of
 
 SHADE = Slice(
@@ -55,3 +58,13 @@ def test_slices_are_read_back_as_they_were_written(slices):
     facts = Facts.parse(facts_of(slices=slices).text(), "here")
     assert facts.slices == slices
     assert ("slices" in json.loads(facts.text())) == bool(slices)
+
+
+def test_drives_of_one_day_count_as_one(tmp_path):
+    fleet = FleetFolder(fleet_of(tmp_path / "week", 14, status=lambda _: SCORED))
+    fleet.drives["group"] = fleet.drives["drive"]
+    assert [*when_it_fails(fleet)] == []  # made before conditions were measured
+    fleet.drives["group"] = "monday"
+    _, sentence = when_it_fails(fleet)
+    assert sentence.text.startswith("Too little")
+    assert sentence.text.endswith("needs 12 groups of drives.")
