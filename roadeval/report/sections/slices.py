@@ -25,7 +25,9 @@ def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[
     if isinstance(findings, FleetFolder):
         drives = findings.drives
         scored = drives[drives["status"].isin([SCORED, DAMAGED])]
-        groups = scored["group"].fillna(scored["log_digest"]).nunique()
+        groups = (
+            scored["group"].astype(object).fillna(scored["log_digest"].astype(object)).nunique()
+        )
         names, unit, few = findings.names, "drives", groups < 2 * LEAST_GROUPS
     else:
         names, unit, few = {}, "drive", findings.facts.frames.evaluated < LEAST_FRAMES
