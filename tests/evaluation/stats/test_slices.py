@@ -21,6 +21,7 @@ REALS = [conditions(seed) for seed in range(6)]
 PLANTS = {name: (what, plant) for name, what, plant in plants(3, REALS)}
 
 
+@pytest.mark.sweep
 def test_at_most_one_of_twenty_null_drives_names_a_slice() -> None:
     found = 0
     for seed in range(20):
@@ -30,6 +31,7 @@ def test_at_most_one_of_twenty_null_drives_names_a_slice() -> None:
     assert found <= 1
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kind", PLANTS)
 def test_a_planted_slice_is_found_with_its_ratio(kind: str) -> None:
     what, plant = PLANTS[kind]
