@@ -42,7 +42,7 @@ _CODE_OF: Final = np.rint(
 
 
 def to_light(image: Rgb) -> Light:
-    """Return the linear light of sRGB codes."""
+    """Return the linear light of ``(H, W, 3)`` sRGB codes."""
     return np.take(_LIGHT_OF, image)
 
 
@@ -71,7 +71,7 @@ def _noisy(light: Light, well: float, random: Random) -> Rgb:
 
 
 def _noise(image: Rgb, strength: float, _: Light, random: Random) -> Rgb:
-    """Give white 4096 / 4^(strength - 1) electrons, as a higher gain does."""
+    """Add the noise of a sensor whose white pixel holds 4096 / 4^(strength - 1) electrons."""
     return _noisy(to_light(image), WELL * 4 ** (1 - strength), random)
 
 
@@ -165,7 +165,7 @@ def _jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
     return np.ascontiguousarray(decoded[..., ::-1])
 
 
-class Kind(NamedTuple):
+class DisturbanceKind(NamedTuple):
     """A kind of disturbance, with the meaning and the range of its strength."""
 
     title: str
@@ -174,15 +174,15 @@ class Kind(NamedTuple):
     most: float
 
 
-KINDS: Final[Mapping[str, Kind]] = {
-    "dark": Kind("stops of less light", _dark, 0, 12),
-    "fog": Kind("200 m over the visibility", _fog, 0, 20),
-    "blur": Kind("radius in 1/320 of the width", _blur, 0, 20),
-    "dirt": Kind("dozens of spots on the lens", _dirt, 0, 10),
-    "rain": Kind("25 mm/h", _rain, 0, 10),
-    "jpeg": Kind("quality, of which less is worse", _jpeg, 1, 100),
-    "noise": Kind("gain as a power of 4", _noise, 0, 6),
-    "exposure": Kind("stops of more light, or less", _exposure, -10, 10),
+KINDS: Final[Mapping[str, DisturbanceKind]] = {
+    "dark": DisturbanceKind("stops of less light", _dark, 0, 12),
+    "fog": DisturbanceKind("200 m over the visibility", _fog, 0, 20),
+    "blur": DisturbanceKind("radius in 1/320 of the width", _blur, 0, 20),
+    "dirt": DisturbanceKind("dozens of spots on the lens", _dirt, 0, 10),
+    "rain": DisturbanceKind("25 mm/h", _rain, 0, 10),
+    "jpeg": DisturbanceKind("quality, of which less is worse", _jpeg, 1, 100),
+    "noise": DisturbanceKind("gain as a power of 4", _noise, 0, 6),
+    "exposure": DisturbanceKind("stops of more light, or less", _exposure, -10, 10),
 }
 
 

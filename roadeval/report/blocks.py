@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from roadeval.report.chart import Chart, Look, legend
 from roadeval.report.drawing import place_chart, range_of_frames
+from roadeval.results.facts import Reason
 from roadeval.runtime.text import as_markdown, visible
 
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
@@ -67,6 +68,8 @@ def _as_json(value: Any) -> Any:
             return visible(value)
         case ImageFile():
             return value.name
+        case Reason():
+            return visible(value.text)
         case Block():
             return value.as_json()
         case list() | tuple():
@@ -115,7 +118,8 @@ class BulletList(Block):
     """A titled list of sentences."""
 
     title: str
-    items: Sequence[str]
+    items: Sequence[str | Reason]
+    """On a page the frames of a reason are links to them."""
     tone: str = "plain"
     """``plain`` or ``warning``."""
     focus: str = ""
@@ -171,7 +175,7 @@ def blocks_as_markdown(blocks: Iterable[Block]) -> str:
                 lines += [as_markdown(block.text), ""]
             case BulletList():
                 lines += [f"**{as_markdown(block.title)}**", ""]
-                lines += [*(f"- {as_markdown(item)}" for item in block.items), ""]
+                lines += [*(f"- {as_markdown(plain(item))}" for item in block.items), ""]
             case Table():
                 lines += [as_markdown(block.caption), ""] if block.caption else []
                 lines += [*_table_lines(block), ""]
@@ -184,9 +188,9 @@ def _table_lines(table: Table) -> list[str]:
     return [f"| {' | '.join(cells)} |" for cells in (table.columns, sides, *rows)]
 
 
-def plain(cell: Cell | str) -> str:
-    """Return the text of a table's cell."""
-    return cell.text if isinstance(cell, Cell) else cell
+def plain(item: Cell | Reason | str) -> str:
+    """Return the text of a table's cell, or of an item of a list."""
+    return item if isinstance(item, str) else item.text
 
 
 @dataclass(frozen=True)

@@ -152,6 +152,25 @@ class LogFacts:
     digest: str
 
 
+@dataclass(frozen=True)
+class Reason:
+    """A sentence on the errors of a variant, and the frames that show what it says."""
+
+    sentence: str
+    frames: list[int]
+
+    @property
+    def text(self) -> str:
+        """The sentence with the numbers of the frames.
+
+        >>> Reason("All is dark.", [3, 50]).text
+        'All is dark; see frames 3, 50.'
+        """
+        word = "frames" if len(self.frames) > 1 else "frame"
+        numbers = f"; see {word} {', '.join(map(str, self.frames))}" if self.frames else ""
+        return f"{self.sentence.removesuffix('.')}{numbers}."
+
+
 class FactsFile:
     """A JSON file of facts, with its format and a checksum."""
 
@@ -284,8 +303,8 @@ class Facts(FactsFile):
     """Totals with a stage replaced by the truth."""
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, by variant and disturbance."""
-    why: dict[str, list[str]] = field(default_factory=dict)
-    """What is confirmed about the errors of each variant, see `roadeval.results.why.explain`."""
+    why: dict[str, list[Reason]] = field(default_factory=dict)
+    """Reasons for the errors of each variant, see `roadeval.results.why.explain`."""
     misfits: list[str] = field(default_factory=list)
     """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
     slices: dict[str, list[Slice]] = field(default_factory=dict)
@@ -442,8 +461,8 @@ class FleetFacts(FactsFile):
     """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, over drives."""
-    why: dict[str, list[str]] = field(default_factory=dict)
-    """As of a drive."""
+    why: dict[str, list[Reason]] = field(default_factory=dict)
+    """As in `Facts`."""
     slices: dict[str, list[Slice]] = field(default_factory=dict)
     """As in `Facts`, over groups of drives."""
 

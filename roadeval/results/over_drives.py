@@ -87,11 +87,16 @@ def summarise(
         run=run,
         misfits=[*_misfits(rows)],
         disturbances=_degradations(disturbances or {}, groups, settings.confidence),
-        slices={} if read is None else _slices(read, drives, groups, settings.confidence),
+        slices={}
+        if read is None
+        else slices_over_drives(read, drives, groups, settings.confidence),
     )
+    facts = replace(facts, verdict=verdict_on(facts))
+    if read is None:
+        return facts
+    facts = replace(facts, slices=slices_over_drives(read, drives, groups, settings.confidence))
     scored = [row["drive"] for row in rows if row["evaluated"]]
-    why = {} if read is None else explain(facts, read("classes", scored))
-    return replace(facts, verdict=verdict_on(facts), why=why)
+    return replace(facts, why=explain(facts, read("classes", scored)))
 
 
 def _degradations(
@@ -120,7 +125,7 @@ def _degradations(
     return as_corrected(means)
 
 
-def _slices(
+def slices_over_drives(
     read: Callable[[str, Sequence[str]], pd.DataFrame],
     drives: pd.DataFrame,
     groups: Mapping[str, str],

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 from roadeval.data import BASELINE
 from roadeval.data.words import percent
 from roadeval.evaluation.score.degradation import Degradations
-from roadeval.evaluation.stats.slices import Condition, Slice
+from roadeval.evaluation.stats.slices import FrameCondition, Slice
 from roadeval.evaluation.tables import by_class, only
-from roadeval.results.facts import Facts, FleetFacts
+from roadeval.results.facts import Facts, FleetFacts, Reason
 from roadeval.results.schema import TAG
 from roadeval.results.sentences import is_significant
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 TIMES: Final = 1.5
 """Least ratio of two error rates that a sentence tells as a ratio."""
 MOST: Final = 4
-"""Most sentences about a variant."""
+"""Most reasons for the errors of a variant."""
 
 
-def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[str]]:
-    """Return the sentences about each variant; none about one of which nothing is confirmed.
+def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[Reason]]:
+    """Return the reasons for the errors of each variant of which something is confirmed.
 
     They name the class of its false road and the class beside its missed road, the condition under
     which it errs most, and the disturbance that harms it most. Nothing is explained if truth or
@@ -35,40 +35,30 @@ def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[
     if facts.misfits:
         return {}
     variants = (name for name in facts.finals if name != BASELINE)
-    sentences = {name: [*islice(_reasons(facts, classes, name), MOST)] for name in variants}
-    return {name: reasons for name, reasons in sentences.items() if reasons}
+    by_variant = {name: [*islice(_reasons(facts, classes, name), MOST)] for name in variants}
+    return {name: reasons for name, reasons in by_variant.items() if reasons}
 
 
-def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> Iterator[str]:
+def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> Iterator[Reason]:
     """Yield what is confirmed about a variant: of its classes, its conditions, its disturbances."""
     rows = only(classes, variant=variant)
     for kind, sentence in describe_classes(rows, variant).items():
-        yield with_frames(sentence, _worst_frames(rows, kind) if isinstance(facts, Facts) else [])
-    # That one part of the image is worse than the rest is told by its region.
+        yield Reason(sentence, _worst_frames(rows, kind) if isinstance(facts, Facts) else [])
+    # Regions tell already if one part of the image is worse than the rest.
     conditional = (confirmed for confirmed in facts.slices.get(variant, []) if confirmed.conditions)
     for confirmed in islice(conditional, 1):
-        numbers = [] if confirmed.drives else [*map(str, confirmed.worst)]
-        yield with_frames(describe_slice(confirmed), numbers)
+        yield Reason(describe_slice(confirmed), [] if confirmed.drives else confirmed.worst)
     changes = facts.disturbances.get(variant, {})
     if any(is_significant(change.difference) for change in changes.values()):
-        yield describe_disturbances({variant: changes}, variant)
+        yield Reason(describe_disturbances({variant: changes}, variant), [])
 
 
-def _worst_frames(classes: pd.DataFrame, kind: str) -> list[str]:
+def _worst_frames(classes: pd.DataFrame, kind: str) -> list[int]:
     """Return the frames with most false road of a class, or with most missed road."""
     is_kind = classes["truth"] == ("other" if kind == "false" else "road")
     wrong = classes["road"] if kind == "false" else classes["pixels"] - classes["road"]
-    return str(classes["worst"].iloc[wrong.where(is_kind, -1).to_numpy().argmax()]).split()
-
-
-def with_frames(sentence: str, numbers: list[str]) -> str:
-    """Return a sentence with the frames that show it.
-
-    >>> with_frames("All is dark.", ["3", "50"])
-    'All is dark; see frames 3, 50.'
-    """
-    word = "frames" if len(numbers) > 1 else "frame"
-    return f"{sentence.rstrip('.')}; see {word} {', '.join(numbers)}." if numbers else sentence
+    most = wrong.where(is_kind, -1).to_numpy().argmax()
+    return [*map(int, str(classes["worst"].iloc[most]).split())]
 
 
 NAMED: Final = 3
@@ -123,12 +113,12 @@ _QUANTITIES: Final = {
 """Words behind "frames" for each quantity, and those for below and above its limit."""
 
 
-def describe_condition(condition: Condition) -> str:
+def describe_condition(condition: FrameCondition) -> str:
     """Return a condition as words behind "frames".
 
-    >>> describe_condition(Condition("shadow", ">", 0.3))
+    >>> describe_condition(FrameCondition("shadow", ">", 0.3))
     'with more than 30 % shade'
-    >>> describe_condition(Condition("hour", "<", 17.5))
+    >>> describe_condition(FrameCondition("hour", "<", 17.5))
     'before 17:30 UTC'
     """
     name, limit = condition.quantity, condition.limit
@@ -157,7 +147,7 @@ def describe_part(part: str) -> str:
 def describe_slice(failure: Slice) -> str:
     """Return where ERR is higher, and by how much, as a sentence.
 
-    >>> shade = Condition("shadow", ">", 0.3)
+    >>> shade = FrameCondition("shadow", ">", 0.3)
     >>> describe_slice(Slice([shade], "20-80m", 90, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01))
     'In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest (1.8 to 4.9).'
     """

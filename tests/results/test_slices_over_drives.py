@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from benchmarks.slices import make_fleet
-from roadeval.evaluation.stats.slices import Condition
-from roadeval.results.over_drives import _slices
+from roadeval.evaluation.stats.slices import FrameCondition
+from roadeval.results.over_drives import slices_over_drives
 
 
 @pytest.mark.parametrize(("drives", "named"), [(40, True), (0, False)])
@@ -21,8 +21,8 @@ def test_a_tag_of_a_drive_is_a_condition_and_a_fleet_without_drives_has_none(dri
         "frames": frames.assign(variant="net", stage="post", final=True),
         "regions": parts.rename(columns={"wrong": "FP"}).assign(FN=0, variant="net"),
     }
-    slices = _slices(
+    slices = slices_over_drives(
         lambda name, _: tables[name], table, dict(zip(names, names, strict=True)), 0.95
     )
     conditions_named = [s.conditions for s in slices.get("net", [])]
-    assert ([Condition("tag_weather", "is", "rain")] in conditions_named) == named
+    assert ([FrameCondition("tag_weather", "is", "rain")] in conditions_named) == named

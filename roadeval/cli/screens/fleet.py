@@ -46,7 +46,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         blocks: list[Block] = [rates_table(facts)]
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
         blocks += disturbances.brief(facts)
-        blocks += [reasons for reasons in why(facts) if reasons.on_paper]
+        blocks += why(facts)
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show(
             [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],

@@ -75,7 +75,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
     yield from disturbances.brief(facts)
     if metres:
         yield distance_table(metres, [*facts.finals], brief=True)
-    yield from (reasons for reasons in why(facts) if reasons.on_paper)
+    yield from why(facts)
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

@@ -32,7 +32,7 @@ def show(blocks: Iterable[Block], out: Console) -> None:
             case BulletList():
                 out.print(f"{block.title}:")
                 for item in block.items:
-                    out.print(f"- {item}")
+                    out.print(f"- {plain(item)}")
             case Table():
                 show_table(block, out)
             case _:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from roadeval.data import NO_CLASS, ROAD, FrameResult, Rgb, Truth, TruthClass
-from roadeval.data.arrays import FP, IGNORED, Plane
+from roadeval.data.arrays import FN, FP, IGNORED, Plane
 from roadeval.evaluation.stats.slices import ON_CLASS
 
 if TYPE_CHECKING:
@@ -35,15 +35,19 @@ QUANTITIES: Final[Mapping[str, str]] = {
 }
 """The measured quantities with their meanings."""
 ACROSS: Final = 64
+"""Width in pixels at which light and change are measured."""
 LINES: Final = 32
 """Rows of a frame that are looked at for blur and curvature, about as many."""
 LEAST_ROWS: Final = 6
+"""Rows with road that curvature needs."""
 FAR: Final = 4
+"""Pixels between the farther ones that blur compares."""
 DIGITS: Final = 5
+"""Digits of a value behind the point."""
 
 
 def shrink(image: Rgb) -> Plane:
-    """Return an image's luminance, ``(h, 64)`` uint8."""
+    """Return the luminance of an ``(H, W, 3)`` image, ``(h, 64)`` uint8."""
     import cv2
 
     height, width, _ = image.shape
@@ -55,7 +59,7 @@ def shrink(image: Rgb) -> Plane:
 
 
 def blur(image: Rgb) -> float:
-    """Return how smooth an image is along some of its rows; NaN if it has one colour."""
+    """Return how smooth an ``(H, W, 3)`` image is, see `QUANTITIES`; NaN if it has one colour."""
     rows = image[:: max(len(image) // LINES, 1), :, 1].astype(np.int16)
     if rows.shape[1] <= FAR:
         return math.nan
@@ -64,7 +68,7 @@ def blur(image: Rgb) -> float:
 
 
 def curvature(truth: Truth) -> float:
-    """Return how bent the road is, see `QUANTITIES`; NaN if it is seen in few rows."""
+    """Return how bent the road of an ``(H, W)`` truth is, see `QUANTITIES`; NaN in few rows."""
     road = truth[:: max(len(truth) // LINES, 1)] == ROAD
     sizes = road.sum(axis=1)
     there = sizes > 0
@@ -88,10 +92,8 @@ def parts_of(result: FrameResult) -> Iterator[tuple[str, str | int, int, int]]:
     for variant, errors in result.errors.items():
         halves = np.array_split(errors.array.astype(np.uint8, copy=False), 2, axis=1)
         for name, half in zip(("left", "right"), halves, strict=True):
-            wrong, ignored = (
-                np.count_nonzero(half & bits == code) for bits, code in ((6, FP), (4, IGNORED))
-            )
-            yield variant, name, int(wrong), int(half.size - ignored)
+            by_outcome = np.bincount(half.ravel(), minlength=IGNORED + 1)
+            yield variant, name, int(by_outcome[[FP, FN]].sum()), int(by_outcome[:IGNORED].sum())
     for variant, by_class in result.classes.items():
         for code in np.flatnonzero(by_class[:NO_CLASS, 0]).tolist():
             yield variant, code, int(by_class[code, 1]), int(by_class[code, 0])

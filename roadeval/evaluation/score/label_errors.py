@@ -49,7 +49,7 @@ _FLOOR: Final = 0.0025
 _CLEAR: Final = 4
 """Multiple of the usual score of a drive from which a label is clearly wrong."""
 _MUCH: Final = 10
-"""That multiple where only methods say so, which may err themselves."""
+"""Such a multiple where only methods say so, which may err themselves."""
 
 
 class Reason(StrEnum):
@@ -162,7 +162,7 @@ def _carry_label(near: LabelledView, view: LabelledView) -> Plane | None:
     """
     import cv2
 
-    if min(view.grey.shape) < 32:  # OpenCV compares 8x8 pixels at a quarter of the size, or crashes
+    if min(view.grey.shape) < 32:  # 8x8 pixels are compared, at a quarter of the size
         return None
     dense = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     flow = dense.calc(view.grey, near.grey, np.zeros((*view.grey.shape, 2), np.float32))

@@ -70,7 +70,7 @@ SCENES: Final = 30
 
 
 @dataclass(frozen=True)
-class Condition:
+class FrameCondition:
     """A condition on a frame."""
 
     quantity: str
@@ -86,7 +86,7 @@ class Slice:
     Numbers are of the half that confirms it.
     """
 
-    conditions: list[Condition]
+    conditions: list[FrameCondition]
     part: str
     """The part of the image: ``20-80m`` ahead, ``rows_40-60`` in percent from the top, ``left``,
     ``right``, ``on <class>`` of the truth; empty for whole frames."""
@@ -213,21 +213,21 @@ class _Search:
             slices.append(Slice(of, part, frames, *rates, ratio, *ends, p, *worst))
         return sorted(slices, key=lambda confirmed: -confirmed.ratio)
 
-    def _conditions(self) -> Iterator[tuple[Condition | None, Flags]]:
+    def _conditions(self) -> Iterator[tuple[FrameCondition | None, Flags]]:
         """Yield None, which all frames meet, and conditions, each with whether a frame meets it."""
         yield None, np.ones(len(self._table), bool)
         for name in self._columns:
             column = self._table[name]
             if column.dtype.kind not in "fiu":
                 for word in sorted(column.dropna().unique()):
-                    yield Condition(name, "is", str(word)), (column == word).to_numpy(bool)
+                    yield FrameCondition(name, "is", str(word)), (column == word).to_numpy(bool)
                 continue
             values = column.to_numpy(float)
             measured = values[self._searching & np.isfinite(values)]
             limits = np.quantile(measured, QUANTILES) if len(measured) else ()
             for limit in dict.fromkeys(float(f"{limit:.2g}") for limit in limits):
-                yield Condition(name, ">", limit), values > limit
-                yield Condition(name, "<", limit), values < limit
+                yield FrameCondition(name, ">", limit), values > limit
+                yield FrameCondition(name, "<", limit), values < limit
 
     def _choose(self, meets: Flags) -> Iterator[tuple[Flags, str, tuple[int, ...]]]:
         """Yield the clearest slices of the searching half: flags, part and conditions' places."""

@@ -54,7 +54,7 @@ class Audit:
     labels: int
     """Number of labels that were examined."""
     sentences: list[str]
-    """What does not fit as a whole, how many labels look wrong, and how far annotators differ."""
+    """Sentences on misfits of the whole drive, on wrong labels, and on other annotators."""
     log: str
     """Where the log lies."""
     config: Path | None

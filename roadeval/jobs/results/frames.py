@@ -31,7 +31,7 @@ from roadeval.report.findings import NotableFrame
 from roadeval.report.images import ExampleFrame, LayerImage, fade
 from roadeval.report.sections.frames import SMALL, strip
 from roadeval.results.facts import focus_of
-from roadeval.results.sentences import notes as notes_on
+from roadeval.results.sentences import notes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -174,7 +174,7 @@ class FramePicker:
         return NotableFrame(
             *(frame, stamp_ns, variant, rates),
             change=change,
-            notes=[*notes_on(rates, variant)],
+            notes=[*notes(rates, variant)],
             images=[*self._outcomes_of(seen, frame)] if seen else [],
             layers=layers,
         )
@@ -228,7 +228,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
     for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: rate for name, rate in rates.items() if name != BASELINE}
-        words, conditions = [*notes_on(rates)], [*_frame_conditions(focus, others, blind)]
+        words, conditions = [*notes(rates)], [*_frame_conditions(focus, others, blind)]
         yield NotableFrame(frame, stamp, focus, rates, notes=words, conditions=conditions)
 
 

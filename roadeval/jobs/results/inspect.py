@@ -44,7 +44,7 @@ class WorstFrame:
     parts: Mapping[str, float] = field(default_factory=dict)
     """The parts of ERR by stage, see `roadeval.evaluation.tables.causes`; none in a fleet."""
     notes: tuple[str, ...] = ()
-    """What a person should know of it beside its rates."""
+    """Sentences on it beside its rates, see `roadeval.results.sentences.notes`."""
     picture: str | None = None
     """In a fleet: the file of its errors."""
     recording: Path | None = None

@@ -27,7 +27,6 @@ from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
-from roadeval.results.tables import read_table
 from roadeval.results.why import explain
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
@@ -167,12 +166,16 @@ class _CameraResult:
 
 def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _CameraResult:
     """Sum up a camera's run, and add the sums to the tables."""
+    import pandas as pd
+
     sums = run.board.summary(run.selection.classes)
-    lines = csv_lines(run.key, sum_rows(run.board, sums.windows, run.selection.classes))
+    rows = sum_rows(run.board, sums.windows, run.selection.classes)
+    lines = csv_lines(run.key, rows)
     results.append(lines)
     shown = [example.frame for example in examples]
     facts = summary.make_facts(run, sums, shown, {} if run.camera else results.tables)
-    classes = read_table("classes", TABLES["classes"].header + lines.get("classes", ""))
+    of_classes = [(*run.key, *row) for row in rows["classes"]]
+    classes = pd.DataFrame(of_classes, columns=[*TABLES["classes"].names])
     facts = replace(facts, why=explain(facts, classes))
     return _CameraResult(facts, sums, _recorded_texts(run, facts, lines), tuple(run.board.metres()))
 

@@ -127,20 +127,8 @@ def _environment() -> Any:
         finalize=lambda value: visible(value) if type(value) is str else value,
     )
     environment.filters["parts"] = _SETTING.split
-    environment.filters["frames"] = _split_frames
     environment.filters["tojson_text"] = lambda value: json.dumps(value, separators=(",", ":"))
     return environment
-
-
-def _split_frames(sentence: str) -> list[str]:
-    """Split off the numbers of the frames that show what a sentence says; they are at odd places.
-
-    >>> _split_frames("Pavement is called road; see frames 3, 50.")
-    ['Pavement is called road; see frames ', '3', ', ', '50', '.']
-    """
-    text, start, frames = sentence.rpartition("; see frame")
-    first, *others = re.split(r"(\d+)", f"{start}{frames}") if start else [frames]
-    return [f"{text}{first}", *others]
 
 
 def _source(image: ImageFile | bytes) -> str:

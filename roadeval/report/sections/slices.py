@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from roadeval.data.words import number, percent
 from roadeval.evaluation.stats.difference import LEAST_GROUPS
 from roadeval.evaluation.stats.slices import LEAST_FRAMES
-from roadeval.report.blocks import Block, Heading, LinkList, Table, Text
+from roadeval.report.blocks import Block, Cell, Heading, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.findings import Findings
 from roadeval.results.fleet import FleetFolder
@@ -24,10 +24,8 @@ def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[
     slices = facts.slices.get(facts.focus or "")
     if isinstance(findings, FleetFolder):
         drives = findings.drives
-        scored = drives[drives["status"].isin([SCORED, DAMAGED])]
-        groups = (
-            scored["group"].astype(object).fillna(scored["log_digest"].astype(object)).nunique()
-        )
+        scored = drives[drives["status"].isin([SCORED, DAMAGED])].astype(object)
+        groups = scored["group"].fillna(scored["log_digest"]).nunique()
         names, unit, few = findings.names, "drives", groups < 2 * LEAST_GROUPS
     else:
         names, unit, few = {}, "drive", findings.facts.frames.evaluated < LEAST_FRAMES
@@ -39,21 +37,18 @@ def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[
         name = "no slices" if slices is not None else "too little for slices"
         yield Text(caption(name, variant=facts.focus, unit=unit, least=least))
         return
-    rows, links = [], dict[str, str]()
+    rows: list[list[Cell | str]] = []
     for failure in slices:
         yield Text(describe_slice(failure))
         frames = [str(frame) for frame in failure.worst]
         if failure.drives:
             pairs = zip(failure.drives, frames, strict=True)
             frames = [f"{names.get(drive, drive)} {frame}" for drive, frame in pairs]
-        elif level == 1:
-            links |= {f"Frame {frame}": f"#frame-{frame}" for frame in frames}
+        linked = [] if failure.drives or level > 1 else failure.worst
         ratio = f"{failure.ratio:.1f} ({failure.low:.1f} to {failure.high:.1f})"
         rates = percent(failure.inside), percent(failure.outside)
-        place = describe_place(failure)
-        rows.append([place, number(failure.frames), *rates, ratio, ", ".join(frames)])
+        worst = Cell(", ".join(frames), frames=linked)
+        rows.append([describe_place(failure), number(failure.frames), *rates, ratio, worst])
     columns = ["where", "frames", "ERR, %", "elsewhere, %", "ratio", "worst frames"]
     yield Table(columns, rows, text_columns=(0, 5), small=True)
     yield note("slices", variant=facts.focus, unit=unit)
-    if links:
-        yield LinkList([*links.items()])

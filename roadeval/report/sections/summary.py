@@ -50,7 +50,8 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [caption("partial")], "warning")
     yield Text(findings.facts.verdict, "verdict")
-    yield from why(findings.facts)
+    for name in dict.fromkeys((findings.facts.focus, *findings.facts.why)):
+        yield from why(findings.facts, name)
     for frame in findings.worst[:1]:
         title = f"First frame to look at: {frame.frame}"
         if frame.rates:
@@ -74,7 +75,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
 def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     facts = findings.facts
     yield Text(facts.verdict, "verdict")
-    yield from (reasons for reasons in why(facts) if reasons.on_paper)
+    yield from why(facts)
     for frame in records(findings.worst[:1]):
         where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
         title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"
@@ -88,12 +89,15 @@ def _of_drives(findings: FleetFolder) -> Iterator[Block]:
     yield _beware([*fleet_warnings(findings)])
 
 
-def why(facts: Facts | FleetFacts) -> Iterator[BulletList]:
-    """Yield why each variant errs, as far as it is confirmed; the focus first, alone on paper."""
-    focus = facts.focus
-    for name in sorted(facts.why, key=lambda name: name != focus):
-        is_focus = name == focus
-        yield BulletList(f"Why {name} errs", facts.why[name], focus=name, on_paper=is_focus)
+def why(facts: Facts | FleetFacts, variant: str | None = None) -> Iterator[BulletList]:
+    """Yield the reasons for the errors of a variant, by default the focus, if there are any.
+
+    Those of other variants are for a page on which they may become the focus.
+    """
+    name = variant or facts.focus or ""
+    if reasons := facts.why.get(name):
+        is_focus = name == facts.focus
+        yield BulletList(f"Why {name} errs", reasons, focus=name, on_paper=is_focus)
 
 
 def _beware(sentences: list[str]) -> BulletList:

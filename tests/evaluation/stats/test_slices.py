@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.slices import make_drive, make_fleet, names, plants, walk
 from roadeval.evaluation.score.conditions import QUANTITIES
-from roadeval.evaluation.stats.slices import Condition, find_slices
+from roadeval.evaluation.stats.slices import FrameCondition, find_slices
 
 
 def conditions(seed: int, frames: int = 400) -> pd.DataFrame:
@@ -65,7 +65,7 @@ def test_a_tag_is_compared_between_drives() -> None:
     rain = (of_frames["tag_weather"] == "rain").to_numpy()
     frames.loc[rain, "FP"] *= 4
     found = find_slices(frames, of_frames, parts[:0], 0.95, over_drives=True)
-    assert [Condition("tag_weather", "is", "rain")] in [place.conditions for place in found]
+    assert [FrameCondition("tag_weather", "is", "rain")] in [place.conditions for place in found]
 
 
 @pytest.mark.parametrize("frames", [0, 1, 39])

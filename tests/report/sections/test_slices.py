@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.stats.slices import Condition, Slice
-from roadeval.report.blocks import Heading, LinkList, Table, Text
+from roadeval.evaluation.stats.slices import FrameCondition, Slice
+from roadeval.report.blocks import Heading, Table, Text
 from roadeval.report.sections.slices import when_it_fails
 from roadeval.results.facts import Facts, FrameAccount
 from roadeval.results.fleet import FleetFolder
@@ -16,7 +16,7 @@ from tests.results.fleet.making import fleet_of
 from tests.results.making import facts_of
 
 SHADE = Slice(
-    *([Condition("shadow", ">", 0.3)], "20-80m", 45, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01, [12, 40])
+    *([FrameCondition("shadow", ">", 0.3)], "20-80m", 45, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01, [12, 40])
 )
 
 
@@ -34,8 +34,8 @@ def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
     place = "in frames with more than 30 % shade, 20 to 80 m ahead"
     row = [place, "45", "31.00", "10.00", "3.1 (1.8 to 4.9)", "12, 40"]
     assert plain_rows(the(Table, section)) == [row]
-    assert the(LinkList, section).links == [("Frame 12", "#frame-12"), ("Frame 40", "#frame-40")]
-    assert not [b for b in blocks(level=2, filtered=[SHADE]) if isinstance(b, LinkList)]
+    assert the(Table, section).rows[0][-1].frames == [12, 40]
+    assert not the(Table, blocks(level=2, filtered=[SHADE])).rows[0][-1].frames
 
 
 @pytest.mark.parametrize(
