@@ -181,7 +181,7 @@ def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
     if not worse:
         return f"No disturbance makes {variant} worse."
     sure = [change for change in worse if is_significant(change.difference)]
-    worst = max(sure or worse, key=lambda change: change.difference.mean)
+    worst = max(worse, key=lambda change: change.difference.mean)
     base, error = worst.base_ERR or 0.0, worst.ERR or 0.0
     times = f" ({error / base:.2g} times as high)" if 0 < TIMES * base <= error else ""
     ends = f"from {percent(base, 1)} to {percent(error, 1)} %"

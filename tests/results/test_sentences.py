@@ -122,6 +122,15 @@ def disturbed(*ends: float, p: float | None = None) -> dict[str, Degradation]:
     }
 
 
+def test_what_harms_most_on_these_frames_is_told_though_it_may_be_chance():
+    changes = disturbed(2, 9, 3)
+    sure = replace(changes["fog-2"].difference, p_holm=0.001)
+    changes["fog-2"] = replace(changes["fog-2"], difference=sure)
+    sentence = describe_disturbances({"net": changes}, "net")
+    assert sentence.startswith("fog:1 raises the ERR of net from 2.0 to 9.0 %")
+    assert sentence.endswith("2 of 2 disturbances raise it, 1 beyond chance.")
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from roadeval.data.words import in_percent, number, percent, points
 from roadeval.evaluation.metrics import TESTED
-from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, Table, Text
+from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, KeepTogether, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart, ChartKind, looks
 from roadeval.report.charts.standard import series
@@ -24,7 +24,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     if not facts.disturbances:
         return
     yield Heading("Fog, darkness and other disturbances")
-    yield Text(describe_disturbances(facts.disturbances, facts.focus))
+    sentence = Text(describe_disturbances(facts.disturbances, facts.focus))
     by_variant, columns = looks([*facts.finals]), errors_by_variant(facts)
     names = [*next(iter(columns.values()))]
     marks = [
@@ -32,7 +32,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
         for name, errors in columns.items()
     ]
     chart = Chart("ERR by disturbance", ChartKind.MARKS, marks, names)
-    yield Figure([chart], caption("disturbances"))
+    yield KeepTogether([sentence, Figure([chart], caption("disturbances"))])
     yield Details("Every disturbance in numbers", [_table(facts), note("disturbance intervals")])
 
 
