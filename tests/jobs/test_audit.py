@@ -17,7 +17,7 @@ from roadeval.jobs.results.audit import Audit
 from roadeval.logs.log import describe
 from roadeval.logs.writing.writer import LogWriter
 from tests.evaluation.test_label_errors import FRAMES, image_at, method_at, road_at, wrong_labels
-from tests.jobs.making import settings
+from tests.jobs.making import settings, write_log
 
 NS = 100_000_000
 IGNORED = slice(0, 10)
@@ -190,6 +190,20 @@ def test_labels_to_correct_of_reduced_frames_are_refused_before_the_replay(
 def test_an_annotator_without_masks_is_refused(place: Path) -> None:
     with pytest.raises(RoadevalError, match="no masks of c"):
         roadeval.audit(place / "drive.rrd", annotators=["c"])
+
+
+@pytest.mark.parametrize("words", [[], ["--preset", "gated"]])
+def test_a_log_is_audited_with_the_preset_that_errs_least_or_the_chosen_one(
+    place: Path, tmp_path: Path, words: list[str]
+) -> None:
+    log, truth = place / "drive.mcap", ["--road-label", "3", "--ignore-label", "11"]
+    assert main(["audit", str(log), *truth, *words, "-o", str(tmp_path / "x"), "--quiet"]) == 0
+    assert roadeval.load_config(tmp_path / "x" / "run.toml").preset == (words or ["robust"])[-1]
+
+
+def test_from_python_it_is_the_same_preset(tmp_path: Path) -> None:
+    roadeval.audit(write_log(tmp_path / "small.mcap"), folder=tmp_path / "x")
+    assert roadeval.load_config(tmp_path / "x" / "run.toml").preset == "robust"
 
 
 def test_the_command_shows_what_is_wrong_and_what_to_type_next(

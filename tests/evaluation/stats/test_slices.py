@@ -6,6 +6,7 @@ import pytest
 
 from benchmarks.slices import make_drive, make_fleet, names, plants, walk
 from roadeval.evaluation.score.conditions import QUANTITIES
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.stats.slices import FrameCondition, find_slices
 
 
@@ -99,3 +100,26 @@ def test_a_class_is_named_under_a_condition_and_never_alone() -> None:
     assert all(place.conditions for place in found if place.part == "on car")
     parts.loc[parts["region"] == "on car", "wrong"] = 100
     assert all(place.conditions for place in find_slices(frames, of_frames, parts, 0.95))
+
+
+def test_what_bright_drives_have_in_common_is_no_effect_of_light_within_drives() -> None:
+    rng, tables = np.random.default_rng(11), []
+    for place, bright in enumerate(rng.permutation(np.linspace(0, 1, 40))):
+        real = pd.DataFrame({"brightness": bright + 0.3 * rng.standard_normal(60)})
+        drive = f"d{place:02d}"
+        made = make_drive(rng, real, 60, 1, name=drive, level=0.03 + 0.09 * bright)
+        tables.append((made[0], made[1].assign(group=drive), made[2]))
+    frames, of_frames, parts = (
+        pd.concat(rows, ignore_index=True) for rows in zip(*tables, strict=True)
+    )
+    assert find_slices(frames, of_frames, parts[:0], 0.95, over_drives=True) == []
+
+
+@pytest.mark.parametrize("memory", [1, 20])
+def test_the_error_of_a_difference_allows_for_slow_errors_in_slow_conditions(memory: int) -> None:
+    rng, frames = np.random.default_rng(12), 200
+    halves = np.where(np.arange(frames) < frames // 2, 2, -2) / frames
+    series = [walk(rng, frames, memory) for _ in range(80)]
+    differences = [halves @ values for values in series]
+    errors = [mean_distribution(values, factors=halves).standard_error for values in series]
+    assert 0.75 < np.sqrt(np.mean(np.square(errors))) / np.std(differences) < 1.35
