@@ -306,7 +306,7 @@ def _compare_two(
     base_keys = {drive.key: old.key for old, drive in matched}
     drive_names = {drive.key: drive.name for drive in new.drives}
     frames = Counter[str]()
-    levels, masks, regions, classes = [], [], [], []
+    levels, masks, regions = [], [], []
     drives: list[DriveChange] = []
     without_frames: list[str] = []
     for batch in _batches(new.scored):
@@ -335,8 +335,6 @@ def _compare_two(
         new_regions = new.table("regions", {key: key for key in new_keys.values()})
         parts = common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups))
-        new_classes = new.table("classes", {key: key for key in new_keys.values()})
-        classes.append((base.table("classes", new_keys), new_classes))
     if not masks:
         raise ComparisonError(
             f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
@@ -348,6 +346,8 @@ def _compare_two(
         disagreed = disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
     of_masks, of_regions = (None, None) if several else (pairs, parts)
     changed = _changed_settings(matched)
+    old_classes = base.table("classes", {old: key for key, old in base_keys.items()})
+    new_classes = new.table("classes", {key: key for key in base_keys})
     return Comparison(
         results=(
             _compared_result(base, frames["base"]),
@@ -362,7 +362,7 @@ def _compare_two(
         disagreements=tuple(disagreed),
         warnings=tuple(_warnings(labels, without_frames, frames, changed)),
         settings=settings,
-        classes=tuple(_class_changes(new.label, *map(concatenate, zip(*classes, strict=True)))),
+        classes=tuple(_class_changes(new.label, old_classes, new_classes)),
     )
 
 
