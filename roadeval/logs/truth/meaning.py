@@ -98,6 +98,32 @@ class Labels:
     """``(H, W)`` uint16 codes of a confidence map."""
 
 
+class ClassCodes:
+    """Codes of label values, or of packed colours, in the order in which they occur.
+
+    The first 255 have codes, from 0; `NO_CLASS` stands for all others. Any thread may use it.
+    """
+
+    def __init__(self, *, by_color: bool) -> None:
+        self.values: Final[dict[int, int]] = {}
+        """The code of each value that has one, in the order of codes."""
+        self._table = np.full(1 << 24 if by_color else TOP + 1 - LEAST, NO_CLASS, np.uint8)
+        """Negative values index from the end."""
+        self._lock = Lock()
+
+    def of(self, labels: npt.NDArray[Any]) -> Classes:
+        """Return the codes of ``(H, W)`` labels or packed colours."""
+        values = np.maximum(labels, LEAST) if labels.dtype.kind == "i" else labels
+        codes: Classes = self._table[values]
+        if (unseen := values[codes == NO_CLASS]).size:
+            with self._lock:
+                for value in np.unique(unseen).tolist():
+                    if value in self.values or len(self.values) < NO_CLASS:
+                        self._table[value] = self.values.setdefault(value, len(self.values))
+            codes = self._table[values]
+        return codes
+
+
 @dataclass(frozen=True, eq=False)
 class ClassMap:
     """The meaning of the values, or of the colours, of label pictures."""
@@ -113,45 +139,19 @@ class ClassMap:
     """Doubts about the meaning, a sentence each."""
     names: Mapping[int, str] = field(default_factory=dict)
     """The names of label values, or packed colours, as far as they are known."""
-    codes: dict[int, int] = field(default_factory=dict)
-    """The code of each label value, or packed colour, that has occurred, in the order of codes."""
+    codes: ClassCodes | None = None
+    """None for plain masks, which have no classes."""
 
     @property
     def classes(self) -> list[TruthClass]:
         """The classes that have occurred, each at the position of its code."""
-        words = {ROAD: "road", NON_ROAD: "other", IGNORE: "ignored", UNKNOWN: ""}
+        words = {ROAD: "road", NON_ROAD: "other", IGNORE: "ignored"}
         classes = []
-        for value in self.codes:
+        for value in self.codes.values if self.codes else ():
             truth = self.meaning.get(value, IGNORE if value < 0 else self.others)
             name = self.names.get(value, _color_name(value) if self.by_color else "")
             classes.append(TruthClass(value, elide(name, LONG), words[truth]))
         return classes
-
-    @cached_property
-    def _code_table(self) -> npt.NDArray[np.uint8]:
-        """One more than the code by label value or packed colour; 0 for none."""
-        table = np.zeros(1 << 24 if self.by_color else TOP + 1 - LEAST, np.uint8)
-        for value, code in self.codes.items():
-            table[value] = code + 1
-        return table
-
-    def classes_of(self, labels: npt.NDArray[Any]) -> Classes | None:
-        """Return the codes of ``(H, W)`` labels or packed colours; None for those of plain masks.
-
-        Of more than 255 classes the last ones have no code. Any thread may call this.
-        """
-        if self.others == UNKNOWN:
-            return None
-        values = np.maximum(labels, LEAST) if labels.dtype.kind == "i" else labels
-        table = self._code_table
-        codes: Classes = table[values] - np.uint8(1)
-        if (unseen := values[codes == NO_CLASS]).size:
-            with _CODING:
-                for value in np.unique(unseen).tolist():
-                    if value in self.codes or len(self.codes) < NO_CLASS:
-                        table[value] = self.codes.setdefault(value, len(self.codes)) + 1
-            codes = table[values] - np.uint8(1)
-        return codes
 
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
@@ -175,11 +175,11 @@ class ClassMap:
             truth = np.full(colors.shape, self.others, np.uint8)
             for color, meaning in self.meaning.items():
                 truth[colors == color] = meaning
-            return Labels(truth, classes=self.classes_of(colors))
+            return Labels(truth, self.codes.of(colors) if self.codes else None)
         values = to_labels(picture, limits)
         if values.ndim != 2:
             raise BadMessage("it holds colours, not label values")
-        return Labels(self.of_values(values), classes=self.classes_of(values))
+        return Labels(self.of_values(values), self.codes.of(values) if self.codes else None)
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
         """Translate ``(H, W)`` labels; a `BadMessage` if a value is unknown, or beyond 65535."""
@@ -240,8 +240,6 @@ class Confidence:
         return levels.astype(np.uint16) * (TOP // 255) if levels.dtype == np.uint8 else levels
 
 
-_CODING: Final = Lock()
-"""Held while values get codes."""
 Meaning = ClassMap | Confidence
 """The meaning of the label pictures of one source."""
 
@@ -380,7 +378,8 @@ def _as_named(
                 raise LogError(problem, setting=f"{place}{ending}", remedy=Sentence(remedy))
             meaning[codes[name]] = truth
             words[-1].append(text(name))
-    return ClassMap(meaning, NON_ROAD, bool(ending), _words(words[0], words[1]))
+    by_color, codes_of_classes = bool(ending), ClassCodes(by_color=bool(ending))
+    return ClassMap(meaning, NON_ROAD, by_color, _words(*words), codes=codes_of_classes)
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
@@ -637,7 +636,6 @@ def meaning_of(
     else:
         meaning = find_meaning(stated, counts, labels.name, shown)
     pixels = sum(map(Counter, counts), Counter[int]())
-    meaning = replace(meaning, codes={v: n for n, v in enumerate(sorted(pixels)[:NO_CLASS])})
     of_truth = Counter[int]()
     for value, count in pixels.items():
         of_truth[meaning.meaning.get(value, meaning.others)] += count

@@ -141,7 +141,7 @@ def test_a_plain_mask_has_no_classes_and_more_than_255_have_no_codes():
     assert plain.read(picture, LIMITS).classes is None
     assert plain.classes == []
     meaning = find_meaning(LabelSettings(road=(3,)), [[0, 3]], "/labels")
-    codes = meaning.classes_of(np.arange(300, dtype=np.uint16))
+    codes = meaning.codes.of(np.arange(300, dtype=np.uint16))
     assert codes.tolist() == [*range(255), *[NO_CLASS] * 45]
 
 
