@@ -379,7 +379,7 @@ def _as_named(
             meaning[codes[name]] = truth
             words[-1].append(text(name))
     by_color, codes_of_classes = bool(ending), ClassCodes(by_color=bool(ending))
-    return ClassMap(meaning, NON_ROAD, by_color, _words(*words), codes=codes_of_classes)
+    return ClassMap(meaning, NON_ROAD, by_color, _words(words[0], words[1]), codes=codes_of_classes)
 
 
 def _counted(origin: LabelSet, classes: Iterable[str], limit: int = 8) -> str:
