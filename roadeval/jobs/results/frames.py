@@ -99,15 +99,24 @@ class FramePicker:
 
     def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
         """Yield a picture of each frame: the errors of the focus, or without truth its mask."""
+        if self._recording:
+            names = [variant.name for variant in self._recording.variants]
+            focus = self._result.focus or focus_of(names) or ""
+            for frame in numbers:
+                yield replace(self.outcome(focus, frame), title=f"frame {frame}")
+
+    def outcome(self, variant: str, frame: int) -> LayerImage:
+        """Return the errors of a variant on a frame, or without truth its mask."""
         recording = self._recording
-        for frame in numbers if recording else ():
-            assert recording is not None
-            named = {variant.name: variant for variant in recording.variants}
-            focus = named[self._result.focus or focus_of(named) or ""]
-            final = next(spec for spec in focus.layers if spec.name == focus.stages[-1])
-            spec = ERRORS if frame in self._scored else final
-            layer = recording.layer(focus.name, spec.name, frame)
-            yield LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
+        assert recording is not None
+        (layout,) = (layout for layout in recording.variants if layout.name == variant)
+        (final,) = (spec for spec in layout.layers if spec.name == layout.stages[-1])
+        spec, image = ERRORS if frame in self._scored else final, recording.image(frame)
+        if (layer := self._result.layer(variant, spec.name, frame)) is None:
+            return LayerImage(f"{variant}: no mask", fade(image))
+        return LayerImage(
+            f"{variant}: {'errors' if spec is ERRORS else 'mask'}", image, spec, layer
+        )
 
     def worst(self) -> list[NotableFrame]:
         """Return the worst frames of the focus, one a scene, all worse than the mean.
@@ -184,12 +193,8 @@ class FramePicker:
         image = recording.image(frame)
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, recording.truth(frame))
-        for name in (variant.name for variant in recording.variants[self._outcomes]):
-            errors = self._result.layer(name, ERRORS.name, frame)
-            if errors is None:
-                yield LayerImage(f"{name}: no mask", fade(image))
-            else:
-                yield LayerImage(f"{name}: errors", image, ERRORS, errors)
+        for variant in recording.variants[self._outcomes]:
+            yield self.outcome(variant.name, frame)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
