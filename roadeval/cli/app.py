@@ -16,7 +16,7 @@ from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.help import WIDEST, GroupedCommand, Program
 from roadeval.errors import RoadevalError
-from roadeval.runtime import memory
+from roadeval.runtime import discovery, memory
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import debug, defect, likely
 
@@ -118,6 +118,9 @@ def explain(error: BaseException) -> int:
         case OSError(strerror=str(reason)):
             code = ExitCode.FAILED
             sentence = f"{reason}: {error.filename}" if error.filename else reason
+        case _ if package := discovery.failed_package(error):
+            code = ExitCode.FAILED
+            sentence = f"the package {package} failed: {discovery.one_line(error)}"
         case _ if memory.is_lacking(error):
             code, sentence = ExitCode.FAILED, memory.LACKING
         case _:
