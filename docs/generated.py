@@ -1,13 +1,15 @@
 """What the pages take from the code: ``python docs/generated.py`` writes it between their marks.
 
 A mark is ``<!-- generated exit_codes: ... -->``; what it names ends at ``<!-- end -->``. The site
-also takes pages from other files of the project, and adds the links that only it can have.
+also takes pages from other files of the project, and adds the links that only it can have. The
+schemas are written as well.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import runpy
 import textwrap
 from collections.abc import Callable, Iterator
 from inspect import getdoc, getsource
@@ -197,5 +199,6 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
 
 
 if __name__ == "__main__":
+    runpy.run_path(str(DOCS / "schemas.py"))["write"]()
     for path in DOCS.rglob("*.md"):
         path.write_text(written(path.read_text(encoding="utf-8")), encoding="utf-8")
