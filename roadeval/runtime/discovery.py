@@ -7,9 +7,16 @@ One file of a folder adds one thing. A package adds the same by an entry point o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import (
+    EntryPoint,
+    EntryPoints,
+    PackageNotFoundError,
+    entry_points,
+    version,
+)
 from pkgutil import iter_modules
 from traceback import walk_tb
 from types import ModuleType
@@ -82,10 +89,19 @@ def package_of(point: EntryPoint) -> str:
     return visible(point.dist.name if point.dist else point.module)
 
 
-def versions() -> dict[str, str]:
+def versions_of_additions() -> dict[str, str]:
     """Return the versions of the packages whose additions take part in every run."""
     points = (point for kind in KINDS if kind != "stages" for point in points_of(kind))
     return {package_of(point): point.dist.version for point in points if point.dist}
+
+
+def versions_of(packages: Iterable[str]) -> dict[str, str]:
+    """Return the versions of packages, as far as they are installed."""
+    versions = {}
+    for package in packages:
+        with suppress(PackageNotFoundError):
+            versions[package] = version(package)
+    return versions
 
 
 def failed_package(error: BaseException) -> str:

@@ -43,7 +43,11 @@ def test_an_entry_point_adds_one_thing_or_several(package):
     regions = discovery.installed("regions", Region, RoadevalError)
     assert [region.titles for region in regions] == [{"left": "left"}] * 2
     assert discovery.installed("metrics", Region, RoadevalError) == []
-    assert discovery.versions() == {"more-things": "1.5"} == {"more-things": version("more-things")}
+    assert (
+        discovery.versions_of_additions()
+        == {"more-things": "1.5"}
+        == {"more-things": version("more-things")}
+    )
 
 
 @pytest.mark.parametrize(

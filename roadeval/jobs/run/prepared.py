@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -336,8 +335,8 @@ def computing() -> dict[str, str]:
     """Return the versions of the packages that compute, others' additions included."""
     import cv2
 
-    packages = {package: version(package) for package in COMPUTING}
-    return {"opencv": cv2.__version__, **packages, **discovery.versions()}
+    packages = discovery.versions_of(COMPUTING)
+    return {"opencv": cv2.__version__, **packages, **discovery.versions_of_additions()}
 
 
 def software(config: RunConfig) -> dict[str, str]:
