@@ -39,6 +39,6 @@ def pack(
     for warning in packed.warnings:
         messages.warning(warning)
     if not quiet:
-        masks = f", {packed.labelled} with a mask" if truth else ""
+        masks = f", {packed.labelled} with a mask" if packed.labelled else ""
         console.say(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
     return ExitCode.DONE
