@@ -16,7 +16,7 @@ from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.help import WIDEST, GroupedCommand, Program
 from roadeval.errors import RoadevalError
-from roadeval.runtime import memory
+from roadeval.runtime import discovery, memory
 from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import debug, defect, likely
 
@@ -118,6 +118,8 @@ def explain(error: BaseException) -> int:
         case OSError(strerror=str(reason)):
             code = ExitCode.FAILED
             sentence = f"{reason}: {error.filename}" if error.filename else reason
+        case _ if sentence := _fault_of_a_package(error):
+            code = ExitCode.FAILED
         case _ if memory.is_lacking(error):
             code, sentence = ExitCode.FAILED, memory.LACKING
         case _:
@@ -126,6 +128,15 @@ def explain(error: BaseException) -> int:
     if isinstance(error, console.OutputError):
         console.drop()
     return code
+
+
+def _fault_of_a_package(error: BaseException) -> str:
+    """Return the sentence on an error of a package from outside, or one that is missing."""
+    if isinstance(error, ModuleNotFoundError) and not f"{error.name}".startswith("roadeval"):
+        return f"{error.name} is not installed: install roadeval with all that it depends on"
+    if package := discovery.failed_package(error):
+        return f"the package {package} failed: {discovery.one_line(error)}"
+    return ""
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:
