@@ -291,8 +291,8 @@ class Log:
                 names = [shown_name(label.path, settings.path) for label in origin.labels]
                 check_names(names, camera.topic, self.topics)
             count = len(images) if images.sure == images.expected() == len(images) else None
-            own = [*map(Path, selection.names)]
-            labels = find_keys(origin, settings.path, settings, images.limits, count, named=own)
+            paths = [*map(Path, selection.names)]
+            labels = find_keys(origin, settings.path, settings, images.limits, count, named=paths)
             return source_beside_log(
                 labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms
             )
