@@ -84,6 +84,25 @@ def write_images(folder: Path) -> None:
             (folder / name / f"{number:04}.png").write_bytes(encoded(pixels))
 
 
+def write_kitti(folder: Path) -> None:
+    """Write two images of each category of KITTI's road benchmark, and a method's results."""
+    training = folder / "kitti" / "training"
+    for path in (*map(training.joinpath, ("image_2", "gt_image_2", "calib")), folder / "results"):
+        path.mkdir(parents=True)
+    for number in range(6):
+        image, road = scene(number)
+        kind, height = ("um", "umm", "uu")[number % 3], image.shape[0]
+        truth = np.dstack([255 * road, 0 * road, 0 * road + 255]).astype(np.uint8)
+        (training / f"image_2/{kind}_{number:06}.png").write_bytes(encoded(image[..., ::-1]))
+        (training / f"gt_image_2/{kind}_road_{number:06}.png").write_bytes(encoded(truth))
+        (training / f"calib/{kind}_{number:06}.txt").write_text(
+            f"P2: {height} 0 {height} 0 0 {height} {height / 2} 0 0 0 1 0\n"
+            "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_cam_to_road: 1 0 0 0 0 1 0 -1.6 0 0 1 0\n"
+        )
+        moved = encoded(np.roll(road, 2, axis=1) * np.uint8(255))
+        (folder / f"results/{kind}_road_{number:06}.png").write_bytes(moved)
+
+
 @pytest.fixture(scope="module")
 def world(tmp_path_factory) -> Path:
     """What the pages speak of: drives, pictures, masks, a network, and results."""
@@ -98,6 +117,7 @@ def world(tmp_path_factory) -> Path:
     (folder / "tuesday").mkdir()
     shutil.copy(folder / "street.mcap", folder / "tuesday")
     write_images(folder)
+    write_kitti(folder)
     write_drive(folder / "bare.mcap", truth="")
     write_coco(folder / "coco.json")
     write_drive(folder / "rig.mcap", cameras=("front", "left"), truth="labels")
