@@ -12,7 +12,6 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, Final
 
 import numpy as np
@@ -115,7 +114,7 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
     return np.asarray(fitted.reshape(height, width, -1), np.uint8)
 
 
-def encode(pictures: Iterable[Plane], form: str, rate: float, options: dict[str, str]) -> bytes:
+def encode(pictures: Iterable[Plane], form: str, rate: Any, options: dict[str, str]) -> bytes:
     """Encode pictures with even sides, ``rate`` a second, as ``webm``, ``mp4`` or ``gif``."""
     import av
 
@@ -125,8 +124,7 @@ def encode(pictures: Iterable[Plane], form: str, rate: float, options: dict[str,
         stream = None
         for picture in pictures:
             if stream is None:
-                rounded = Fraction(round(100 * rate), 100)
-                stream = container.add_stream(_CODECS[form], rate=rounded, options=options)
+                stream = container.add_stream(_CODECS[form], rate=rate, options=options)
                 stream.height, stream.width = picture.shape[:2]
                 stream.pix_fmt = "rgb8" if form == "gif" else "yuv420p"
                 stream.thread_count, stream.gop_size = 1, _KEYFRAMES
@@ -138,10 +136,7 @@ def encode(pictures: Iterable[Plane], form: str, rate: float, options: dict[str,
 
 
 def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) -> Rgb:
-    """Return panels beside each other below their titles, and a line on the colours and the drive.
-
-    It has 960 to 1920 pixels across; small images are enlarged by a whole number.
-    """
+    """Return panels with titles, 960 to 1920 pixels across, and a line on colours and drive."""
     import cv2
 
     painted = np.hstack([paint(panel) for panel in panels])

@@ -117,7 +117,7 @@ def test_pictures_bear_number_rates_colours_and_drive(recording, tmp_path, monke
     }
     assert told == [
         ([f"frame 2, b: {rates['b']}", f"frame 2, a: {rates['a']}"], "drive"),
-        (["frame 3, b: mask", "frame 3, a: mask"], "drive"),
+        (["frame 3, b: not scored", "frame 3, a: not scored"], "drive"),
     ]
 
 
@@ -152,7 +152,6 @@ def test_a_results_folder_stands_for_its_recording(recording, tmp_path, capsys):
         (("--frames", "400:800"), 1, "drive.rrd: no pictures of such frames"),
         (("--focus", "nobody"), 1, "--focus: there is no variant nobody"),
         (("--frames", "40-80"), 2, "--frames"),
-        (("--frames", "1:2", "--worst", "1"), 2, "not both"),
         (("-o", "{drive}.rrd/x"), 1, "drive.rrd"),
     ],
 )

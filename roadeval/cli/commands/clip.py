@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
-
-import typer
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.arguments import option
 from roadeval.cli.commands.inspect import Results
 
 
-def _frames(text: str) -> range:
-    first, last = map(int, text.split(":"))
-    return range(first, last + 1)
+def _span(text: str) -> range:
+    if not (match := re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)):
+        raise ValueError(f"{text}: write the first and the last frame, as 40:80")
+    return range(int(match[1]), int(match[2]) + 1)
 
 
 def clip(
@@ -23,12 +23,8 @@ def clip(
     output: Annotated[
         Path, option("-o --output", "Folder, or the .mp4 or .gif of one clip.", "FOLDER|FILE")
     ] = Path("clips"),
-    worst: Annotated[
-        int | None, option("--worst", "Worst scenes. Default: 5, or 1 into a file.", "K", min=1)
-    ] = None,
-    frames: Annotated[
-        range | None, option("--frames", "One clip, of frames A to B.", "A:B", parser=_frames)
-    ] = None,
+    worst: Annotated[int | None, option("--worst", "Worst scenes. Default: 5.", "K", min=1)] = None,
+    frames: Annotated[range | None, option("--frames", "Only these.", "A:B", parser=_span)] = None,
     focus: arguments.Focus = None,
     mcap: Annotated[bool, option("--mcap", "Also the log's own messages, as a log.")] = False,
     quiet: arguments.Quiet = False,
@@ -41,8 +37,6 @@ def clip(
     Each shows 2 s before and after the worst frame of a scene: the errors of the focus, and beside
     them those of the best other variant. The messages begin 2 s earlier, and 'replay' opens them.
     """
-    if worst and frames:
-        raise typer.BadParameter("give --worst or --frames, not both")
     from roadeval.jobs.results.clip import clip as run
 
     with progress.show(quiet) as watch:

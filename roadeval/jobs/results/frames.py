@@ -100,23 +100,18 @@ class FramePicker:
     def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
         """Yield a picture of each frame: the errors of the focus, or without truth its mask."""
         if self._recording:
-            names = [variant.name for variant in self._recording.variants]
-            focus = self._result.focus or focus_of(names) or ""
-            for frame in numbers:
-                yield replace(self.outcome(focus, frame), title=f"frame {frame}")
+            focus = self._result.focus or focus_of(v.name for v in self._recording.variants) or ""
+            for n in numbers:
+                yield replace(self.outcome(self._recording, focus, n), title=f"frame {n}")
 
-    def outcome(self, variant: str, frame: int) -> LayerImage:
+    def outcome(self, recording: Recording, variant: str, frame: int) -> LayerImage:
         """Return the errors of a variant on a frame, or without truth its mask."""
-        recording = self._recording
-        assert recording is not None
         (layout,) = (layout for layout in recording.variants if layout.name == variant)
         (final,) = (spec for spec in layout.layers if spec.name == layout.stages[-1])
         spec, image = ERRORS if frame in self._scored else final, recording.image(frame)
         if (layer := self._result.layer(variant, spec.name, frame)) is None:
             return LayerImage(f"{variant}: no mask", fade(image))
-        return LayerImage(
-            f"{variant}: {'errors' if spec is ERRORS else 'mask'}", image, spec, layer
-        )
+        return LayerImage(f"{variant}: {spec.name}", image, spec, layer)
 
     def worst(self) -> list[NotableFrame]:
         """Return the worst frames of the focus, one a scene, all worse than the mean.
@@ -194,7 +189,7 @@ class FramePicker:
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, recording.truth(frame))
         for variant in recording.variants[self._outcomes]:
-            yield self.outcome(variant.name, frame)
+            yield self.outcome(recording, variant.name, frame)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.

@@ -352,8 +352,7 @@ class TopicReader:
     def span(self, kind: TopicKind, begin: int, end: int, stamp: int) -> Iterator[int]:
         """Yield the positions of the messages that belong to a span of log times.
 
-        Calibrations and static transforms begin before it, a video at a keyframe. An image up to
-        10 s after it may be a label of a frame in it, if its own stamp is at most ``stamp``.
+        Images up to 10 s later may be labels of it, if their stamps are at most ``stamp``.
         """
         low, high = np.searchsorted(self.log_times, (begin, end + 1)).tolist()
         if kind is TopicKind.TRANSFORMS:
