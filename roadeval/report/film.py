@@ -147,7 +147,7 @@ def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) 
         painted[np.tile((near_road > 0) & (truth == NON_ROAD), len(panels))] = 255
         texts.insert(-1, "white: the true road's edge")
     height, width = painted.shape[:2]
-    across = min(width * -(-960 // width), 1920)
+    across = min(width * -(-960 // width), 1920) // 2 * 2
     titles = np.hstack([_line([panel.title], across // len(panels)) for panel in panels])
     enlarged = _fit(painted, across, round(height * across / width / 2) * 2)
     return np.vstack([titles, enlarged, _line(texts, across)])
