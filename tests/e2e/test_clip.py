@@ -42,7 +42,7 @@ def test_a_clip_plays_in_a_browser_in_its_colours(demo, tmp_path, watched):
     wait_until(tab, f"!{video}.seeking")
     shown = np.array(Image.open(io.BytesIO(tab.locator("video").screenshot())).convert("RGB"))
     assert shown.shape == pictures[4].shape
-    assert np.abs(shown.astype(int) - pictures[4]).mean() < 4
+    assert np.abs(shown.astype(int) - pictures[4]).mean() < 2
     tab.evaluate(f"() => {video}.play()")
     wait_until(tab, f"{video}.ended")
     assert tab.evaluate(f"{video}.duration") == pytest.approx(len(pictures) / 2)
