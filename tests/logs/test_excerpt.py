@@ -9,7 +9,7 @@ from mcap_ros2._dynamic import serialize_dynamic
 
 from roadeval.logs.log import open_log
 from tests.fixtures.make import make
-from tests.logs.making import COMPRESSED, SECOND, compressed, grey, jpeg
+from tests.logs.making import COMPRESSED, SECOND, compressed, grey, jpeg, ros2_log
 
 TENTH = SECOND // 10
 
@@ -98,6 +98,13 @@ def test_an_excerpt_has_all_topics_from_two_seconds_before_to_the_last_frames_en
     times = [m.log_time for *_, m in messages]
     assert times == sorted(times)
     assert all(m.log_time in (m.publish_time + 1, begin) for *_, m in messages)
+
+
+def test_where_all_stamps_are_equal_nothing_later_is_taken_for_a_label(tmp_path):
+    images = [("/camera", at * TENTH, compressed(7, jpeg(grey(at)))) for at in range(50)]
+    with open_log(ros2_log(tmp_path / "drive.mcap", images), every_topic=True) as log:
+        log.write_excerpt("/camera", 24, 25, tmp_path / "part.mcap")
+    assert [m.log_time // TENTH for *_, m in written(tmp_path / "part.mcap")] == [*range(4, 26)]
 
 
 def test_the_video_of_an_excerpt_begins_at_a_keyframe(tmp_path):

@@ -51,8 +51,8 @@ def clip(
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
     if not scenes or (form and len(scenes) > 1):
-        problem = "a file holds one clip: name a folder" if scenes else "no pictures of such frames"
-        raise RoadevalError(problem, where=place if scenes else result)
+        one, none = "a file holds one clip: name a folder", "no pictures of such frames were kept"
+        raise RoadevalError(one if scenes else none, where=place if scenes else result)
     # With its matrix stated, no player guesses it from the size.
     options = {"crf": "20", "preset": "veryfast", "colorspace": "smpte170m"}
     total = sum(len(numbers) for _, numbers, _ in scenes)

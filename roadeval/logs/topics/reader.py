@@ -362,7 +362,7 @@ class TopicReader:
         elif kind is TopicKind.VIDEO and low < high:
             low = Video(self, self.limits).keyframe(low)
         latest = np.searchsorted(self.log_times, end + 10 * NS) if kind in PICTURES else high
-        while high < latest and UNREADABLE < self.stamp(high) <= stamp:
+        while high < latest and self.stamp(0) < self.stamp(high) <= stamp:
             high += 1
         yield from range(low, high)
 
