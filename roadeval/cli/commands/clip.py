@@ -24,7 +24,7 @@ def clip(
         Path, option("-o --output", "Folder, or the .mp4 or .gif of one clip.", "FOLDER|FILE")
     ] = Path("clips"),
     worst: Annotated[int | None, option("--worst", "Worst scenes. Default: 5.", "K", min=1)] = None,
-    frames: Annotated[range | None, option("--frames", "Only these.", "A:B", parser=_span)] = None,
+    frames: Annotated[range | None, option("--frames", "One clip, of these frames.", "A:B", parser=_span)] = None,
     focus: arguments.Focus = None,
     mcap: Annotated[bool, option("--mcap", "Also the log's own messages, as a log.")] = False,
     quiet: arguments.Quiet = False,
@@ -34,8 +34,9 @@ def clip(
         roadeval clip recordings/drive.rrd
         roadeval clip recordings/drive.rrd --frames 40:80 -o turn.mp4 --mcap
 
-    Each shows 2 s before and after the worst frame of a scene: the errors of the focus, and beside
-    them those of the best other variant. The messages begin 2 s earlier, and 'replay' opens them.
+    Each clip shows 2 s before and after the worst frame of a scene: the errors of the focus, and
+    beside them those of the best other variant. The messages begin 2 s earlier, and 'replay' opens
+    them.
     """
     from roadeval.jobs.results.clip import clip as run
 

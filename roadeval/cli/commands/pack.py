@@ -26,7 +26,7 @@ def pack(
     ] = None,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Make a log of a folder of images, of KITTI's road benchmark, or of a video.
+    """Make a log of images, a video, or KITTI's road benchmark.
 
         roadeval pack images/ --truth masks/ -o drive.mcap
 
