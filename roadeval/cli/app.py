@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
@@ -18,7 +19,7 @@ from roadeval.cli.help import WIDEST, GroupedCommand, Program
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
 from roadeval.runtime.sentence import Sentence
-from roadeval.runtime.text import debug, defect, likely
+from roadeval.runtime.text import debug, defect, likely, visible_lines
 
 FIRST: Final = (
     *("replay", "fleet", "report", "inspect", "compare"),
@@ -123,6 +124,8 @@ def explain(error: BaseException) -> int:
         case _:
             code, sentence = ExitCode.DEFECT, defect(error)
     messages.error(_with_notes(sentence, error))
+    if draft := getattr(error, "draft", ""):
+        sys.stderr.write(f"\n{visible_lines(draft)}\n")
     if isinstance(error, console.OutputError):
         console.drop()
     return code

@@ -9,7 +9,7 @@ from PIL import Image
 
 from roadeval.networks import NetSettings, Network, NetworkError
 from roadeval.networks.network import fit_image
-from tests.networks.making import IMAGE, ROAD, SIZE, network, written
+from tests.networks.making import IMAGE, ROAD, SIZE, by_ultralytics, network, written
 
 pytestmark = pytest.mark.usefixtures("opened_here_alone")
 
@@ -149,14 +149,6 @@ def test_whole_numbers_that_are_quantised_probabilities_are_no_classes(tmp_path)
     path = ended(tmp_path / "n.onnx", ending, (160, 120))
     with pytest.raises(NetworkError, match="DequantizeLinear"):
         Network.of(NetSettings(file=str(path), road=(1,)))
-
-
-def by_ultralytics(path, names, **more):
-    model = onnx.load(path)
-    made = {"author": "Ultralytics", "task": "semantic", "names": str(names)} | more
-    helper.set_model_props(model, made)
-    onnx.save(model, path)
-    return path
 
 
 @pytest.mark.parametrize("road", [None, (0,), (1,)])
