@@ -96,7 +96,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def explain(error: BaseException) -> int:
-    """Write why the command ended, in one line, and return its exit code.
+    """Write why the command ended, in one line and a draft that mends it; return its exit code.
 
     If ``ROADEVAL_DEBUG=1`` is in the environment, the traceback comes first.
     """

@@ -161,10 +161,10 @@ def load(settings: NetSettings) -> OnnxFile:
         remedy = "give the path of an ONNX file"
         raise NetworkError("names no network", setting="net.file", remedy=remedy)
     path, documents = Path(settings.file), None
-    if path.is_dir():
-        documents = path, *makers.read_documents(path)
-        path = makers.find_network(path)
     with reading(path, "cannot read the network"):
+        if path.is_dir():
+            documents = path, *makers.read_documents(path)
+            path = makers.find_network(path)
         check_input(path)
         status = path.stat()
     if status.st_size > LARGEST:
