@@ -38,7 +38,7 @@ from roadeval.jobs.run.prepared import prepare, process
 from roadeval.logs.log import open_log
 from roadeval.pipeline.stage import View
 from roadeval.recording.layout import RecordRule
-from roadeval.recording.recorder import recorder_for
+from roadeval.recording.recorder import Recorder
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -143,7 +143,7 @@ def measure_stages(drive: Path, folder: Path) -> dict[str, list[float]]:
     config = configure({"run": {"jobs": 1}})
     with open_log(drive) as log, one_thread_each():
         run = prepare(log, config, ignore)
-        recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
+        recorder = Recorder(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
             for position, logged in enumerate(log.frames(run.selection)):
                 frame, seconds = timed(logged.decode)

@@ -24,7 +24,7 @@ from roadeval.logs.frames import LoggedFrame
 from roadeval.logs.log import open_log
 from roadeval.recording import codecs
 from roadeval.recording.layout import RecordRule
-from roadeval.recording.recorder import recorder_for
+from roadeval.recording.recorder import Recorder
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
 from roadeval.runtime.threads import map_ordered
@@ -74,7 +74,7 @@ def hold(drive: Path, config: RunConfig) -> Held:
     with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         results, sizes = [], []
-        recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
+        recorder = Recorder(drive.with_suffix(".held.rrd"), run.layout(), ALL)
         for position, (_, done) in enumerate(process([run], NoRecorder(), ignore)):
             result = done.encoded
             if position % max(1, -(-len(run.frames) * _bytes(result) // HELD_BYTES)) == 0:
@@ -141,7 +141,7 @@ def measure_floor(
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
         return recorder.encode(result, number), lines_of(result)
 
-    recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
+    recorder = Recorder(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
     with codecs, recorder:
         for encoded, lines in map_ordered(work, held.frames(), jobs):
@@ -154,7 +154,7 @@ def measure_loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Measure `replay` without its training, its summary and its figures."""
     with open_log(drive, config) as log:
         run = prepare(log, config, ignore)
-        recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
+        recorder = Recorder(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
             for _, done in process([run], recorder, ignore):

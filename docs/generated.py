@@ -1,14 +1,17 @@
 """What the pages take from the code: ``python docs/generated.py`` writes it between their marks.
 
 A mark is ``<!-- generated exit_codes: ... -->``; what it names ends at ``<!-- end -->``. The site
-also takes pages from other files of the project, and adds the links that only it can have.
+also takes pages from other files of the project, and adds the links that only it can have. The
+schemas and the requirements of a gate are written as well.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import runpy
 import textwrap
+import tomllib
 from collections.abc import Callable, Iterator
 from inspect import getdoc, getsource
 from pathlib import Path
@@ -147,6 +150,20 @@ def _narrow(comment: re.Match[str]) -> str:
     return textwrap.fill(words, 80, initial_indent="# ", subsequent_indent="# ") + "\n"
 
 
+# --- Packages -------------------------------------------------------------------------------------
+
+
+NOT_OF_A_GATE: Final = {"av", "dask", "distributed", "matplotlib", "rerun-sdk", "typst"}
+"""What `replay` without a recording and `compare` do without: video, fleets, figures, PDF."""
+
+
+def gate() -> str:
+    """Return the requirements of a job that replays without a recording, and compares."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    names = ((line, re.split("[<>=]", line)[0]) for line in project["dependencies"])
+    return "".join(f"{line}\n" for line, name in names if name not in NOT_OF_A_GATE)
+
+
 # --- Results --------------------------------------------------------------------------------------
 
 
@@ -197,5 +214,7 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
 
 
 if __name__ == "__main__":
+    runpy.run_path(str(DOCS / "schemas.py"))["write"]()
+    (DOCS / "gate.txt").write_text(gate(), encoding="utf-8")
     for path in DOCS.rglob("*.md"):
         path.write_text(written(path.read_text(encoding="utf-8")), encoding="utf-8")

@@ -3,3 +3,5 @@
 from typing import Final
 
 VERSION: Final = "0.2.0"
+REPOSITORY: Final = "https://github.com/roadeval/roadeval"
+"""The project's address, which ``pyproject.toml`` states as well."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
@@ -17,9 +16,9 @@ from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.help import WIDEST, GroupedCommand, Program
 from roadeval.errors import RoadevalError
-from roadeval.runtime import memory
+from roadeval.runtime import discovery, memory
 from roadeval.runtime.sentence import Sentence
-from roadeval.runtime.text import debug, defect, likely, visible_lines
+from roadeval.runtime.text import debug, defect, likely
 
 FIRST: Final = (
     *("replay", "fleet", "report", "inspect", "compare"),
@@ -119,16 +118,25 @@ def explain(error: BaseException) -> int:
         case OSError(strerror=str(reason)):
             code = ExitCode.FAILED
             sentence = f"{reason}: {error.filename}" if error.filename else reason
+        case _ if sentence := _fault_of_a_package(error):
+            code = ExitCode.FAILED
         case _ if memory.is_lacking(error):
             code, sentence = ExitCode.FAILED, memory.LACKING
         case _:
             code, sentence = ExitCode.DEFECT, defect(error)
-    messages.error(_with_notes(sentence, error))
-    if draft := getattr(error, "draft", ""):
-        sys.stderr.write(f"\n{visible_lines(draft)}\n")
+    messages.error(_with_notes(sentence, error), getattr(error, "draft", ""))
     if isinstance(error, console.OutputError):
         console.drop()
     return code
+
+
+def _fault_of_a_package(error: BaseException) -> str:
+    """Return the sentence on an error of a package from outside, or one that is missing."""
+    if isinstance(error, ModuleNotFoundError) and not f"{error.name}".startswith("roadeval"):
+        return f"{error.name} is not installed: install roadeval with all that it depends on"
+    if package := discovery.failed_package(error):
+        return f"the package {package} failed: {discovery.one_line(error)}"
+    return ""
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:

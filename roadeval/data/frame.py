@@ -11,6 +11,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data.calibration import Calibration
+
 Rgb = npt.NDArray[np.uint8]
 """``(H, W, 3)`` uint8, channels red, green, blue."""
 Mask = npt.NDArray[np.uint8]
@@ -75,6 +77,10 @@ class Frame:
     """The image topic."""
     classes: Classes | None = None
     """The classes of the truth's pixels, by their codes; None if the truth has no classes."""
+    name: str = ""
+    """The name of its image, as ``umm_000012``, if the log has it."""
+    calibration: Calibration | None = None
+    """Its own calibration and mounting, if each image of the log has one."""
 
     @property
     def moment(self) -> Moment:

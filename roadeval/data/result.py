@@ -237,6 +237,8 @@ class FrameResult:
     doubts: tuple[Doubt, ...] = ()
     metres: Mapping[str, FrameMetres] = field(default_factory=dict)
     above: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
+    kitti: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
+    """``(2, 256)`` cells for KITTI's road benchmark, by variant and category."""
     apart: Mapping[str, float] = field(default_factory=dict)
     """ERR by variant of a frame that was labelled because it was in doubt; no total counts it."""
     classes: Mapping[str, Sums] = field(default_factory=dict)

@@ -6,6 +6,7 @@ Rows are those of `roadeval.results.schema.TABLES`, of one drive or of any numbe
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -254,12 +255,14 @@ def separate(
     if apart_ns is None:
         apart_ns = near_ns(stamps)
     places: list[int] = []
-    for place in ranked.tolist():
+    taken = sorted(besides)
+    for place, stamp in zip(ranked.tolist(), stamps[ranked].tolist(), strict=True):
         if len(places) == count:
             break
-        taken = np.array([*besides, *stamps[places]], np.int64)
-        if (np.abs(taken - stamps[place]) >= apart_ns).all():
+        later = bisect(taken, stamp)
+        if all(abs(near - stamp) >= apart_ns for near in taken[max(later - 1, 0) : later + 1]):
             places.append(place)
+            taken.insert(later, stamp)
     return np.array(places, np.int64)
 
 

@@ -223,6 +223,12 @@ def ground_of(
     return ground, Sentence("; ").join(remarks)
 
 
+def ground_under(lens: Calibration, mounting: Mounting) -> Ground:
+    """Return the ground with places along the axes of the root frame, which lies on it."""
+    turn, at = _rotation_of(mounting.rotation).T, np.array(mounting.translation)
+    return Ground(lens.width, lens.height, lens.matrix, _plane(turn, at))
+
+
 def _find_lens(
     lens: Calibration | None, settings: GroundSettings, size: tuple[int, int]
 ) -> tuple[Calibration | None, str]:

@@ -2,7 +2,8 @@
 
 A disturbance is a pure function of an image, seeded by the frame's number: threads change nothing.
 Strength 0 returns the image itself. Light is linear, 0 to 1 (the inverse of sRGB's curve, IEC
-61966-2-1). To add a kind, add a line to `KINDS`.
+61966-2-1). To add a kind, add a line to `BUILT_IN`; another package adds one by an entry point of
+the group ``roadeval.disturbances``.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 import re
 import zlib
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ import numpy.typing as npt
 
 from roadeval.data import Rgb
 from roadeval.errors import SettingError
+from roadeval.runtime.discovery import by_name, installed
 from roadeval.runtime.text import likely
 
 Light = npt.NDArray[np.float32]
@@ -168,22 +170,32 @@ def _jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
 class DisturbanceKind(NamedTuple):
     """A kind of disturbance, with the meaning and the range of its strength."""
 
+    name: str
     title: str
     apply: Apply
     least: float
     most: float
 
 
-KINDS: Final[Mapping[str, DisturbanceKind]] = {
-    "dark": DisturbanceKind("stops of less light", _dark, 0, 12),
-    "fog": DisturbanceKind("200 m over the visibility", _fog, 0, 20),
-    "blur": DisturbanceKind("radius in 1/320 of the width", _blur, 0, 20),
-    "dirt": DisturbanceKind("dozens of spots on the lens", _dirt, 0, 10),
-    "rain": DisturbanceKind("25 mm/h", _rain, 0, 10),
-    "jpeg": DisturbanceKind("quality, of which less is worse", _jpeg, 1, 100),
-    "noise": DisturbanceKind("gain as a power of 4", _noise, 0, 6),
-    "exposure": DisturbanceKind("stops of more light, or less", _exposure, -10, 10),
-}
+BUILT_IN: Final = (
+    DisturbanceKind("dark", "stops of less light", _dark, 0, 12),
+    DisturbanceKind("fog", "200 m over the visibility", _fog, 0, 20),
+    DisturbanceKind("blur", "radius in 1/320 of the width", _blur, 0, 20),
+    DisturbanceKind("dirt", "dozens of spots on the lens", _dirt, 0, 10),
+    DisturbanceKind("rain", "25 mm/h", _rain, 0, 10),
+    DisturbanceKind("jpeg", "quality, of which less is worse", _jpeg, 1, 100),
+    DisturbanceKind("noise", "gain as a power of 4", _noise, 0, 6),
+    DisturbanceKind("exposure", "stops of more light, or less", _exposure, -10, 10),
+)
+
+
+@cache
+def kinds() -> Mapping[str, DisturbanceKind]:
+    """Return the kinds by their names, those of other packages last."""
+    others = installed(
+        "disturbances", DisturbanceKind, SettingError, [kind.name for kind in BUILT_IN]
+    )
+    return by_name((*BUILT_IN, *others))
 
 
 class Disturbance(NamedTuple):
@@ -200,8 +212,8 @@ class Disturbance(NamedTuple):
     def parse(cls, text: str) -> Disturbance:
         """Read ``KIND:STRENGTH``; a `SettingError` with what is allowed if it is none."""
         kind, _, number = text.strip().lower().partition(":")
-        if (allowed := KINDS.get(kind)) is None:
-            remedy = f"{likely(kind, KINDS)}choose {', '.join(KINDS)} (as fog:2)"
+        if (allowed := kinds().get(kind)) is None:
+            remedy = f"{likely(kind, kinds())}choose {', '.join(kinds())} (as fog:2)"
             raise SettingError(f"there is no disturbance {kind!r}", remedy=remedy)
         is_number = re.fullmatch(r"[+-]?\d{1,3}(\.\d{1,3})?", number)
         if not is_number or not allowed.least <= float(number) <= allowed.most:
@@ -212,11 +224,17 @@ class Disturbance(NamedTuple):
     @property
     def name(self) -> str:
         """Its name in tables and paths, as ``fog-2``."""
-        sign = "" if KINDS[self.kind].least >= 0 else "minus" if self.strength < 0 else "plus"
+        sign = "" if not self.is_signed else "minus" if self.strength < 0 else "plus"
         return f"{self.kind}-{sign}{abs(self.strength):g}".replace(".", "_")
 
+    @property
+    def is_signed(self) -> bool:
+        """Whether strengths below 0 mean something; a result may have kinds that are not here."""
+        kind = kinds().get(self.kind)
+        return kind is not None and kind.least < 0
+
     def __str__(self) -> str:
-        sign = "+" if KINDS[self.kind].least < 0 < self.strength else ""
+        sign = "+" if self.is_signed and self.strength > 0 else ""
         return f"{self.kind}:{sign}{self.strength:g}"
 
     def of(self, image: Rgb, frame: int, depth: Light | None = None) -> Rgb:
@@ -230,7 +248,7 @@ class Disturbance(NamedTuple):
         if depth is None or depth.shape != image.shape[:2]:
             depth = assumed_depth(*image.shape[:2])
         random = np.random.default_rng((zlib.crc32(self.kind.encode()), frame))
-        return KINDS[self.kind].apply(image, self.strength, depth, random)
+        return kinds()[self.kind].apply(image, self.strength, depth, random)
 
 
 @lru_cache(4)

@@ -70,7 +70,7 @@ def pack(
     Parameters
     ----------
     images
-        A folder, taken in natural order (``2.png`` before ``10.png``), or a video file.
+        A folder in natural order (``2.png`` before ``10.png``), KITTI's ``training``, or a video.
     output
         The log to write.
     truth

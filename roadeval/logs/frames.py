@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from heapq import heappushpop
 from itertools import islice
 from typing import Final, NamedTuple, TypeVar
@@ -23,7 +24,7 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, PictureSequence, Video
 from roadeval.logs.messages.pixels import deep_samples, to_rgb
 from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
-from roadeval.logs.topics.calibration import calibration_of, is_rectified
+from roadeval.logs.topics.calibration import calibration_of, image_names, is_rectified, lens_at
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.reader import UNREADABLE, TopicInfo, TopicReader
 from roadeval.logs.truth.meaning import (
@@ -83,6 +84,10 @@ class Selection:
     """The source of the ground, or what is missing for it."""
     white: float | None = None
     """The sample that is white in the camera's images; None for images of 8 bits."""
+    names: Sequence[str] = ()
+    """The names of all images, if the log has them: each has its own calibration then."""
+    lens_at: Callable[[int], Calibration | None] = lambda _: None
+    """Read an image's own calibration, by its log time."""
 
     @property
     def image(self) -> TopicInfo:
@@ -243,6 +248,8 @@ def settle(
         ground,
         ground_why,
         _white_sample(images, config.frames.white),
+        image_names(topics, readers),
+        partial(lens_at, topics, readers),
     )
 
 
@@ -400,6 +407,8 @@ class LoggedFrame:
     selection: Selection
     accounting: Accounting
     """The counts that decoding adds to."""
+    calibration: Calibration | None = None
+    """Its own, if each image has one."""
 
     @property
     def labelled(self) -> bool:
@@ -451,6 +460,8 @@ class LoggedFrame:
             {name: (label.truth == ROAD).astype(np.uint8) for name, label in labels.items()},
             {n: label.probability for n, label in labels.items() if label.probability is not None},
             classes=None if truth is None else truth.classes,
+            name="".join(self.selection.names[self.number : self.number + 1]),
+            calibration=self.calibration,
         )
 
     def _label(self, name: str, *sizes: tuple[int, int]) -> Labels:
@@ -582,9 +593,9 @@ class FrameStream:
         if (label := labels.get(TRUTH)) and not isinstance(label.picture, FrameError):
             before = self._contents.setdefault(hash(bytes(label.picture.data)), stamp)
             self.accounting.labels_repeated += before != stamp
-        return LoggedFrame(
-            number, stamp, log_time, picture, labels, self._selection, self.accounting
-        )
+        calibration = self._selection.lens_at(log_time) if self._selection.names else None
+        logged = number, stamp, log_time, picture, labels, self._selection, self.accounting
+        return LoggedFrame(*logged, calibration)
 
 
 def look_at_images(selection: Selection) -> Iterator[str]:

@@ -258,7 +258,13 @@ class Log:
             if (log := log_and_topic(settings.path)[0]) == settings.path:
                 remedy = f"name a topic of it, as {log}:/topic"
                 raise LogError("a log", where=log, remedy=remedy)
-            masks = self._beside_log(settings, selection)
+            try:
+                masks = self._beside_log(settings, selection)
+            except UnclearLabelsError:
+                if not selection.names:  # else it may be a result of KITTI's road benchmark
+                    raise
+                masks = self._beside_log(replace(settings, threshold=0.5), selection)
+                masks = replace(masks, notes=(*masks.notes, f"taken for {masks.meaning.words}"))
             if selection.truth is not None and masks.where == selection.truth.where:
                 raise LogError(f"{masks.where} is the truth that it is scored against")
         except LogError as error:
@@ -285,7 +291,8 @@ class Log:
                 names = [shown_name(label.path, settings.path) for label in origin.labels]
                 check_names(names, camera.topic, self.topics)
             count = len(images) if images.sure == images.expected() == len(images) else None
-            labels = find_keys(origin, settings.path, settings, images.limits, count)
+            paths = [*map(Path, selection.names)]
+            labels = find_keys(origin, settings.path, settings, images.limits, count, named=paths)
             return source_beside_log(
                 labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms
             )

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
@@ -24,12 +23,8 @@ from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
-from roadeval.runtime.discovery import by_name, collect
+from roadeval.runtime.discovery import by_name, collect, one_line, points_of
 from roadeval.runtime.files import sha256_of
-from roadeval.runtime.text import visible
-
-GROUP: Final = "roadeval.stages"
-"""The group of entry points by which a package adds stages."""
 
 STAGES: Final[Mapping[str, Stage]] = by_name((*collect(beyond, "STAGE"), *collect(paper, "STAGE")))
 """The stages of this package, one per file of their folders."""
@@ -47,11 +42,8 @@ class UnknownStageError(RoadevalError, LookupError):
 
 @cache
 def names() -> tuple[str, ...]:
-    """Return the names that a chain may hold, besides ``module:name``.
-
-    They are looked up once: it takes long to search all installed packages.
-    """
-    return (*STAGES, *sorted({point.name for point in entry_points(group=GROUP)} - STAGES.keys()))
+    """Return the names that a chain may hold, besides ``module:name``."""
+    return (*STAGES, *sorted(points_of("stages").names - STAGES.keys()))
 
 
 def stages_of(chain: Iterable[str]) -> tuple[Stage, ...]:
@@ -82,21 +74,17 @@ def import_stage(name: str) -> Stage:
     except UnknownStageError:
         raise
     except Exception as error:  # a module from outside may raise anything
-        raise UnknownStageError(f"stage {name!r} cannot be used: {_one_line(error)}") from error
-
-
-def _one_line(error: Exception) -> str:
-    return visible(" ".join(f"{type(error).__name__}: {error}".split()))
+        raise UnknownStageError(f"stage {name!r} cannot be used: {one_line(error)}") from error
 
 
 def _import_object(name: str) -> Any:
     """Import the object of an entry point or of ``module:name``."""
     module, _, attributes = name.partition(":")
     if not attributes:
-        points = [*entry_points(group=GROUP, name=name)]
+        points = points_of("stages").select(name=name)
         if not points:
             raise UnknownStageError(f"there is no stage {name!r}; choose {', '.join(names())}")
-        return points[0].load()
+        return next(iter(points)).load()
     try:
         return attrgetter(attributes)(import_module(module))
     except ModuleNotFoundError as error:
@@ -173,7 +161,7 @@ def guard(stage: Stage) -> Stage:
             except (RoadevalError, MemoryError):
                 raise
             except Exception as error:  # code from outside may raise anything
-                message = f"{_one_line(error)}{_place(error)}"
+                message = f"{one_line(error)}{_place(error)}"
                 raise StageError(f"stage {stage.name} {problem}: {message}") from error
 
         return run

@@ -41,6 +41,7 @@ from roadeval.recording import rows as columns
 from roadeval.recording import views
 from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule
+from roadeval.recording.no_recording import NO_LINES, NO_TEXTS, Texts
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import indexed_messages
 from roadeval.runtime.files import NewFile, partial_name, remove, writing
@@ -207,10 +208,6 @@ class WorstFrames:
 
 
 ALL: Final = RecordRule()
-Texts = Mapping[str, Mapping[str, str]]
-"""Results by their names, by camera."""
-NO_TEXTS: Final[Texts] = {}
-NO_LINES: Final[Mapping[str, str]] = {}
 UNWRITTEN: Final = 4 << 20
 """Most bytes that wait for Rerun's own thread to write them; Rerun itself has no limit."""
 
@@ -584,36 +581,3 @@ def _keep(_stream: object) -> None:
 def _failure(number: int) -> OSError:
     """Return the error that Rerun met, or would meet, and does not report."""
     return OSError(number, os.strerror(number))
-
-
-class NullRecorder:
-    """A recorder of a run without a recording: it does nothing."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        """Close nothing."""
-
-    def encode(self, result: FrameResult, position: int) -> None:
-        """Encode nothing."""
-
-    def forecast(self, _encoded: None, _frames: int) -> str:
-        """Return nothing to say."""
-        return ""
-
-    def write(self, encoded: None, lines: Mapping[str, str] = NO_LINES) -> None:
-        """Write nothing."""
-
-    def flush(self) -> None:
-        """Flush nothing."""
-
-    def finish(self, results: Mapping[str, str], *, by_camera: Texts = NO_TEXTS) -> None:
-        """Keep nothing."""
-
-
-def recorder_for(
-    path: Path | None, layout: Layout | Mapping[str, Layout], rule: RecordRule
-) -> Recorder | NullRecorder:
-    """Return a recorder that keeps images by a rule; without a path it does nothing."""
-    return NullRecorder() if path is None else Recorder(path, layout, rule)

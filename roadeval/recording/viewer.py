@@ -14,14 +14,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final, TypeVar
-
-import rerun_cli
-from rerun.experimental import ViewerClient
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from roadeval.recording import layout as at
 from roadeval.recording.layout import RecordingError
 from roadeval.runtime import files
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
 
 SIZE: Final = (1920, 1080)
 """Size of a screenshot in pixels; the recording's views are arranged for it."""
@@ -82,6 +82,8 @@ def open_viewer(
     recording: Path, options: Sequence[str] = (), **environment: str
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Start the viewer on a recording; it ends with the block."""
+    import rerun_cli
+
     with socket.socket() as probe:  # the system chooses a free port
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -106,6 +108,8 @@ def open_viewer(
 
 def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerClient:
     """Return a client of the viewer as soon as it has the whole recording."""
+    from rerun.experimental import ViewerClient
+
     deadline = time.monotonic() + LOADING_S
     while time.monotonic() < deadline:
         if process.poll() is not None:

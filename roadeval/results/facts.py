@@ -311,6 +311,8 @@ class Facts(FactsFile):
     """By variant the conditions under which it errs more; a variant that is not there was not
     searched, as with too few frames."""
     windows: int = 0
+    kitti: Totals = field(default_factory=dict)
+    """Rates of KITTI's road benchmark by variant and category; empty for other drives."""
     claims: dict[str, dict[str, int]] = field(default_factory=dict)
     """Number of windows in which each claim of the paper holds."""
     health: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -350,10 +352,10 @@ class Facts(FactsFile):
         *("verdict", "frames", "totals", "beyond", "curves", "thresholds", "difference"),
         *("against_unfiltered", "against_blind", "against_method", "oracles"),
         *("windows", "claims", "health", "warnings", "losses", "settings", "methods"),
-        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why"),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why", "kitti"),
     )
     OPTIONAL = (
-        *("against_method", "curves", "thresholds", "methods", "masks", "files"),
+        *("against_method", "curves", "thresholds", "methods", "masks", "files", "kitti"),
         *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why"),
     )
 

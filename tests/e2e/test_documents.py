@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import cv2
@@ -28,6 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("docs/**/*.md"))]
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE = re.compile(r"# ([\w./-]+\.(?:csv|py|toml|yml))\n")
+SERVICE = re.compile(r"^import (mlflow|wandb)$", re.MULTILINE)
+"""Clients of services, whose recipes are run where they are installed."""
 BY_CI = "python3 -m venv .venv"
 """Begins the two commands of README.md, which `.ci/run` runs."""
 
@@ -90,6 +93,25 @@ def write_segformer(folder: Path) -> None:
     (folder / "preprocessor_config.json").write_text(size)
 
 
+def write_kitti(folder: Path) -> None:
+    """Write two images of each category of KITTI's road benchmark, and a method's results."""
+    training = folder / "kitti" / "training"
+    for path in (*map(training.joinpath, ("image_2", "gt_image_2", "calib")), folder / "results"):
+        path.mkdir(parents=True)
+    for number in range(6):
+        image, road = scene(number)
+        kind, height = ("um", "umm", "uu")[number % 3], image.shape[0]
+        truth = np.dstack([255 * road, 0 * road, 0 * road + 255]).astype(np.uint8)
+        (training / f"image_2/{kind}_{number:06}.png").write_bytes(encoded(image[..., ::-1]))
+        (training / f"gt_image_2/{kind}_road_{number:06}.png").write_bytes(encoded(truth))
+        (training / f"calib/{kind}_{number:06}.txt").write_text(
+            f"P2: {height} 0 {height} 0 0 {height} {height / 2} 0 0 0 1 0\n"
+            "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_cam_to_road: 1 0 0 0 0 1 0 -1.6 0 0 1 0\n"
+        )
+        moved = encoded(np.roll(road, 2, axis=1) * np.uint8(255))
+        (folder / f"results/{kind}_road_{number:06}.png").write_bytes(moved)
+
+
 @pytest.fixture(scope="module")
 def world(tmp_path_factory) -> Path:
     """What the pages speak of: drives, pictures, masks, a network, and results."""
@@ -104,6 +126,7 @@ def world(tmp_path_factory) -> Path:
     (folder / "tuesday").mkdir()
     shutil.copy(folder / "street.mcap", folder / "tuesday")
     write_images(folder)
+    write_kitti(folder)
     write_drive(folder / "bare.mcap", truth="")
     write_coco(folder / "coco.json")
     write_drive(folder / "rig.mcap", cameras=("front", "left"), truth="labels")
@@ -168,7 +191,8 @@ def test_a_page_does_what_it_says(page, here, pytestconfig):
             said = run(here, "bash", "-eu", "-c", content)
             continue
         elif language == "python":
-            run(here, "python", "-c", content)
+            if all(map(find_spec, SERVICE.findall(content))):
+                run(here, "python", "-c", content)
         elif language == "text" and follows:
             if pytestconfig.getoption("write_golden"):
                 written = written.replace(f"```text\n{content}```", f"```text\n{said}```", 1)

@@ -154,18 +154,19 @@ def levels(counts: npt.NDArray[np.uint32]) -> npt.NDArray[np.int64]:
 
 
 def devkit(truth: Mask, confidence: npt.NDArray[Any]) -> dict[str, float]:
-    """MaxF and AP as defined by KITTI's benchmark, threshold by threshold."""
+    """The rates as defined by KITTI's benchmark, threshold by threshold."""
     points = []
     for threshold in np.arange(256) / 255:
         called = confidence >= threshold
         tp, fp = ((called & (truth == each)).sum() for each in (1, 0))
         if tp:
-            points.append((tp / (tp + fp), tp / (truth == 1).sum()))
-    f = [2 * p * r / (p + r) for p, r in points]
-    most = [max((p for p, r in points if r >= k / 10), default=0) for k in range(11)]
-    precision, recall = points[int(np.argmax(f))]
-    names = "MaxF", "AP11", "precision", "recall"
-    return dict(zip(names, (max(f), np.mean(most), precision, recall), strict=True))
+            points.append((tp / (tp + fp), tp / (truth == 1).sum(), fp / (truth == 0).sum()))
+    f = [2 * p * r / (p + r) for p, r, _ in points]
+    most = [max((p for p, r, _ in points if r >= k / 10), default=0) for k in range(11)]
+    precision, recall, fpr = points[int(np.argmax(f))]
+    names = "MaxF", "AP11", "precision", "recall", "FPR", "FNR"
+    values = max(f), np.mean(most), precision, recall, fpr, 1 - recall
+    return dict(zip(names, values, strict=True))
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -273,3 +273,16 @@ def test_a_perfect_stage_is_held_against_the_same_frames_as_they_are():
 )
 def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
     assert tables.merge_names(chains) == order
+
+
+def test_frames_of_a_scene_are_those_near_one_that_ranks_higher():
+    random = np.random.default_rng(3)
+    for _ in range(100):
+        stamps, ranked = random.integers(0, 400, 60), random.permutation(60)
+        count, apart, besides = *random.integers(1, 40, 2).tolist(), random.integers(0, 400, 2)
+        kept = []
+        for place in ranked:
+            taken = np.array([*besides, *stamps[kept]])
+            if len(kept) < count and (abs(taken - stamps[place]) >= apart).all():
+                kept.append(place)
+        assert tables.separate(stamps, ranked, count, apart, besides.tolist()).tolist() == kept

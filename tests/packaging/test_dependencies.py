@@ -2,6 +2,7 @@
 
 import ast
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -13,6 +14,7 @@ import pytest
 
 import roadeval
 from tests.jobs.making import write_log
+from tests.networks.making import red_network
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -126,6 +128,31 @@ def test_no_module_needs_posix_to_be_imported():
     )
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) > 100
+
+
+def test_a_gate_needs_the_packages_of_its_list_alone(tmp_path):
+    listed = (ROOT / "docs" / "gate.txt").read_text()
+    generated = runpy.run_path(str(ROOT / "docs" / "generated.py"))
+    assert listed == generated["gate"](), "out of date: run python docs/generated.py"
+    absent = [name.removesuffix("-sdk") for name in generated["NOT_OF_A_GATE"]]
+    write_log(tmp_path / "drive.mcap", numbers=range(14))
+    (tmp_path / "gate.toml").write_text('output.record = "none"\noutput.figures = false\n')
+    red_network(tmp_path / "road.onnx")
+    script = f"""
+import sys
+sys.modules.update(dict.fromkeys({absent}))
+from roadeval.cli.app import main
+assert main(["replay", "drive.mcap", "--config", "gate.toml", "--train-frames", "2",
+             "--net", "mine=road.onnx", "--reports", "new", "-q"]) == 0
+assert main(["compare", "new", "new", "--fail-if", "post.mine.ERR > +1pp", "--junit", "j.xml",
+             "-o", "new.md", "-q"]) == 0
+assert main(["replay", "drive.mcap", "--save", "out.rrd", "-q"]) == 1
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "rerun is not installed: install roadeval with all" in done.stderr
 
 
 def test_a_second_run_on_an_output_needs_nothing_of_posix(monkeypatch, tmp_path):

@@ -1,6 +1,7 @@
 """The scripts in examples/, the examples of docstrings and the form of findings/."""
 
 import doctest
+import json
 import os
 import re
 import runpy
@@ -33,7 +34,7 @@ def test_the_tour_of_the_api_runs(tmp_path, monkeypatch, capsys):
     assert wanted <= {path.name for path in out.iterdir()}
 
 
-def test_the_example_method_is_installed_and_replayed_by_its_entry_point(tmp_path):
+def test_the_example_package_is_installed_and_used_by_its_entry_points(tmp_path):
     pytest.importorskip("setuptools", minversion="77", reason="builds the example")
     shutil.copytree(ROOT / "examples" / "method", tmp_path / "method")  # a build leaves files
     _run("-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index",
@@ -41,9 +42,21 @@ def test_the_example_method_is_installed_and_replayed_by_its_entry_point(tmp_pat
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
     log = drive.write(tmp_path / "drive.mcap", frames=14)
     (tmp_path / "plain.toml").write_text("training.frames = 4\noutput.figures = false\n")
+    corners = [[0, 47], [20, 20], [44, 20], [63, 47]]
+    outlines = {"road_of": {f"frame_{number:06}": corners for number in range(14)}}
+    (tmp_path / "outlines.json").write_text(json.dumps(outlines))
     _run("-m", "roadeval", "replay", log, "--variant", f"mine={tmp_path / 'method/smooth.toml'}",
+         "--truth", "outlines.json", "--disturb", "fade:0.5",
          "--config", "plain.toml", "--save", "out.rrd", "--reports", "reports",
          cwd=tmp_path, env=environment)  # fmt: skip
+    summary = json.loads((tmp_path / "reports" / "summary.json").read_text())
+    final = summary["totals"]["mine"]["post"]
+    assert final["pooled_caution"] == final["FP"] / (final["TP"] + final["FP"])
+    assert "fade-0_5" in summary["disturbances"]["mine"]
+    assert summary["versions"]["smooth-road"] == "1.0"
+    regions = pd.read_csv(tmp_path / "reports" / "regions.csv")
+    assert "middle" in set(regions.region)
+    _run("-m", "roadeval", "report", "out.rrd", "-o", "without.html", cwd=tmp_path)
     rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
     assert set(rows.stage) == {"smooth", "post"}
     assert roadeval.Recording(tmp_path / "out.rrd").layer("mine", "texture", 11).any()

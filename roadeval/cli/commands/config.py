@@ -16,10 +16,13 @@ def config(*, options: OptionValues) -> int:
 
         roadeval config --preset robust > robust.toml
 
-    Each setting comes with its meaning and range. The file can be edited and given to --config.
+    Each setting comes with its meaning and range. The file can be edited and given to --config;
+    editors complete it by the schema in its first line.
     """
     settings = arguments.configuration(options)
     from roadeval.config.run import config_toml
+    from roadeval.version import REPOSITORY, VERSION
 
+    console.emit(f"#:schema {REPOSITORY}/raw/v{VERSION}/docs/schemas/run.schema.json")
     console.emit(config_toml(settings).rstrip())
     return ExitCode.DONE

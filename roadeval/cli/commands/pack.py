@@ -26,7 +26,7 @@ def pack(
     ] = None,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Make a log of a folder of images or a video.
+    """Make a log of a folder of images, of KITTI's road benchmark, or of a video.
 
         roadeval pack images/ --truth masks/ -o drive.mcap
 
@@ -39,6 +39,6 @@ def pack(
     for warning in packed.warnings:
         messages.warning(warning)
     if not quiet:
-        masks = f", {packed.labelled} with a mask" if truth else ""
+        masks = f", {packed.labelled} with a mask" if packed.labelled else ""
         console.say(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
     return ExitCode.DONE

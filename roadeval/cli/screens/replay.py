@@ -18,7 +18,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections import disturbances
-from roadeval.report.sections.ground import distance_table
+from roadeval.report.sections.ground import distance_table, kitti_table
 from roadeval.report.sections.summary import why
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
@@ -75,6 +75,8 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
     yield from disturbances.brief(facts)
     if metres:
         yield distance_table(metres, [*facts.finals], brief=True)
+    if facts.kitti:
+        yield kitti_table(facts)
     yield from why(facts)
 
 

@@ -1,13 +1,16 @@
 """The metrics.
 
 To add one, add a file with ``METRICS``: each becomes a rate of screens, graphs and reports, and if
-it is tabled a column of the tables and a series of the recording, as its attributes say.
+it is tabled a column of the tables and a series of the recording, as its attributes say. Another
+package adds one by an entry point of the group ``roadeval.metrics``; it is never tabled, so results
+have the same columns everywhere.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import chain
 from typing import Final
 
@@ -15,12 +18,15 @@ import numpy as np
 
 from roadeval.data import Counts
 from roadeval.data.arrays import Floats, Sums
+from roadeval.errors import RoadevalError
 from roadeval.evaluation.metric import Metric, Shown
-from roadeval.runtime.discovery import by_name, collect
+from roadeval.runtime.discovery import by_name, collect, installed
 
+_BUILT_IN: Final[Mapping[str, Metric]] = by_name(chain(*collect(sys.modules[__name__], "METRICS")))
+_OTHERS: Final = installed("metrics", Metric, RoadevalError, _BUILT_IN)
 ALL: Final[Mapping[str, Metric]] = by_name(
     sorted(
-        chain(*collect(sys.modules[__name__], "METRICS")),
+        [*_BUILT_IN.values(), *(replace(metric, tabled=False) for metric in _OTHERS)],
         key=lambda metric: (metric.order, metric.name),
     )
 )

@@ -32,6 +32,7 @@ from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.score.classes import count_classes
 from roadeval.evaluation.score.counts import Name, changes, contours, count, error_map
+from roadeval.evaluation.score.kitti import count_levels
 from roadeval.evaluation.score.metre_sums import measure
 from roadeval.evaluation.score.unlabelled import doubts_of
 from roadeval.evaluation.settings import (
@@ -137,6 +138,7 @@ def _evaluate(
             for oracle, stages in replaced.items()
         },
         metres=metres,
+        kitti=count_levels(frame, masks, dict(probabilities)),
         above={name: survey.levels(p, truth) for name, p in probabilities} if survey else {},
         classes=(
             {}

@@ -92,7 +92,8 @@ class MetreSums:
                     value, *ends = _with_range(sums[:, place, 0] / sums[:, place, 1])
                 yield (variant, "ERR", region, int(sums[0, place, 1]), 0, value, nan, *ends)
             for name, value in kitti(self._above[variant], levels.get(variant)).items():
-                yield variant, name, ABOVE, 0, 0, value, nan, nan, nan
+                if name not in ("FPR", "FNR"):
+                    yield variant, name, ABOVE, 0, 0, value, nan, nan, nan
             for place, (measured, at) in enumerate(self._measures):
                 places = range(place, len(sums) * len(self._measures), len(self._measures))
                 stances = [self._metres_off(variant, stance_place) for stance_place in places]
@@ -137,9 +138,9 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
 
     ``counts`` are a mask's TP, TN, FP and FN, ``(4,)``: they give ``F1``, ``precision`` and
     ``recall``. ``levels`` are the cells by how probable road is, ``(2, 256)`` as of
-    `Survey.levels`: they give ``MaxF``, the greatest F1 of 256 thresholds, with the precision and
-    recall there; and ``AP11``, the mean over eleven recalls from 0 to 1 of the greatest precision
-    at that recall or more. All are NaN without road.
+    `Survey.levels`: they give ``MaxF``, the greatest F1 of 256 thresholds, with the rates there;
+    and ``AP11``, the mean over eleven recalls from 0 to 1 of the greatest precision at that recall
+    or more. All are NaN without road.
 
     References
     ----------
@@ -163,4 +164,6 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
         "AP11": float(np.mean(greatest)),
         "precision": float(precision[best]),
         "recall": float(recall[best]),
+        "FPR": float(negative[with_road][best] / (negative[0] or math.nan)),
+        "FNR": float(1 - recall[best]),
     }

@@ -45,6 +45,7 @@ from roadeval.evaluation.score.conditions import FrameConditions
 from roadeval.evaluation.score.counts import EdgesAndFlicker, Name
 from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.frame import BlindPrior, score_frame
+from roadeval.evaluation.score.kitti import benchmark
 from roadeval.evaluation.score.metre_sums import MetreSums
 from roadeval.evaluation.score.thresholds import Curves, HeatMap
 from roadeval.evaluation.score.unlabelled import Unlabelled
@@ -240,6 +241,7 @@ class Scoreboard:
         self._ground = ground
         self._metres = MetreSums()
         self._above = Curves()
+        self._kitti = Curves()
         self._when = array("q")
         """Number and stamp of each evaluated frame."""
         self._roles: Counter[str] = Counter()
@@ -305,6 +307,7 @@ class Scoreboard:
         self.classes.add(result.frame.moment, result.classes)
         self._metres.add(result.metres)
         self._above.add(result.above)
+        self._kitti.add(result.kitti)
         return doubts
 
     def lose(self) -> None:
@@ -363,6 +366,7 @@ class Scoreboard:
             "disturbances": degradations(disturbed, frames, settings),
             "windows": -(-len(self._when) // (2 * settings.window)),
             "claims": evidence(windows, settings.window),
+            "kitti": benchmark(self._kitti),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
             "slices": self._slices(frames, classes if any(self.classes.rows(classes)) else ()),

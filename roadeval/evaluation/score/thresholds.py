@@ -124,7 +124,7 @@ class Curves:
     def __init__(self) -> None:
         self.counts: dict[Name, Sums] = {}
         """Pixels of non-road and road, ``(2, 65536)`` int64, or cells of ground, ``(2, 256)``."""
-        self._frames: Counter[Name] = Counter()
+        self.frames: Counter[Name] = Counter()
 
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
         """Return ERR of all pixels at the threshold that is best on other frames.
@@ -141,7 +141,7 @@ class Curves:
     def add(self, histograms: Mapping[Name, Histogram]) -> None:
         """Add the histograms of a frame."""
         for name, counts in histograms.items():
-            self._frames[name] += 1
+            self.frames[name] += 1
             self.counts[name] = self.counts.get(name, 0) + counts.astype(np.int64)
 
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
@@ -151,7 +151,7 @@ class Curves:
         """
         figures = {}
         for name, counts in self.counts.items():
-            thresholds, frames = Thresholds.of(counts), self._frames[name]
+            thresholds, frames = Thresholds.of(counts), self.frames[name]
             area = {"frames": frames, "AP": thresholds.average_precision}
             figures[name] = {**area, **thresholds.max_f(), **calibration(counts)}
         return as_tree(figures.items())

@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -41,6 +40,7 @@ from roadeval.results.facts import focus_of
 from roadeval.results.rows import Key, condition_rows, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
+from roadeval.runtime import discovery
 from roadeval.runtime.files import sha256_of
 from roadeval.runtime.memory import TRIM_EVERY, reuse, trim
 from roadeval.runtime.sentence import Sentence
@@ -332,10 +332,11 @@ def deciding(config: RunConfig) -> RunConfig:
 
 @cache
 def computing() -> dict[str, str]:
-    """Return the versions of the packages that compute."""
+    """Return the versions of the packages that compute, others' additions included."""
     import cv2
 
-    return {"opencv": cv2.__version__, **{package: version(package) for package in COMPUTING}}
+    packages = discovery.versions_of(COMPUTING)
+    return {"opencv": cv2.__version__, **packages, **discovery.versions_of_additions()}
 
 
 def software(config: RunConfig) -> dict[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.config.run import RunConfig, run_toml
 from roadeval.data import TUNED, FrameResult, Role
@@ -20,8 +20,8 @@ from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
 from roadeval.logs.log import Log, open_log
 from roadeval.logs.writing.writer import NoSidecar, SidecarWriter
-from roadeval.recording.layout import RecordRule
-from roadeval.recording.recorder import NullRecorder, Recorder, recorder_for
+from roadeval.recording.layout import Layout, RecordRule
+from roadeval.recording.no_recording import NullRecorder
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
@@ -32,6 +32,9 @@ from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
+
+if TYPE_CHECKING:
+    from roadeval.recording.recorder import Recorder
 
 OnFrame = Callable[[FrameResult], None]
 
@@ -125,7 +128,7 @@ def _replay_log(
     rule = RecordRule.parse(config.output.record)
     with (
         SidecarWriter(to.mcap) if to.mcap else NoSidecar() as sidecar,
-        recorder_for(to.recording, layouts, rule) as recorder,
+        _recorder_for(to.recording, layouts, rule) as recorder,
         ResultsWriter(to.reports) as results,
     ):
         drawn = _record_frames(
@@ -182,6 +185,16 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
     classes = pd.DataFrame(of_classes, columns=[*TABLES["classes"].names])
     facts = replace(facts, why=explain(facts, classes))
     return _CameraResult(facts, sums, _recorded_texts(run, facts, lines), tuple(run.board.metres()))
+
+
+def _recorder_for(
+    path: Path | None, layouts: Mapping[str, Layout], rule: RecordRule
+) -> Recorder | NullRecorder:
+    if path is None:
+        return NullRecorder()
+    from roadeval.recording.recorder import Recorder
+
+    return Recorder(path, layouts, rule)
 
 
 def _finish_recording(

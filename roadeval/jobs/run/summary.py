@@ -7,7 +7,6 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -43,6 +42,7 @@ from roadeval.results.facts import (
 from roadeval.results.sentences import misfit
 from roadeval.results.tables import TableFacts
 from roadeval.results.verdict import describe_doubts, verdict_on
+from roadeval.runtime import discovery
 from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.version import VERSION
 
@@ -282,7 +282,7 @@ def _name_cameras(sentences: Mapping[str, Sequence[str]]) -> Iterator[str]:
 
 def versions() -> dict[str, str]:
     """Return the versions of roadeval, Python, what computes, and what writes files."""
-    writing = {name: version(name) for name in ("rerun-sdk", "pandas", "matplotlib")}
+    writing = discovery.versions_of(("rerun-sdk", "pandas", "matplotlib"))
     return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
 

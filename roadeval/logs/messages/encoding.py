@@ -32,6 +32,7 @@ class TopicKind(StrEnum):
     CALIBRATION = "calibration"
     TRANSFORMS = "transforms"
     CLASSES = "classes"
+    NAMES = "names"
     OTHER = "other"
 
 
@@ -92,6 +93,7 @@ _KINDS_AND_FIELDS: Final = {
     "foxglove/FrameTransform": (TopicKind.TRANSFORMS, _FRAME),
     "foxglove/FrameTransforms": (TopicKind.TRANSFORMS, "transforms:frame[]"),
     "vision_msgs/LabelInfo": (TopicKind.CLASSES, f"{_ROS} class_map:class[] threshold:f4"),
+    "roadeval/ImageNames": (TopicKind.NAMES, ""),
 }
 """Kinds and fields of messages, by package and message."""
 LAYOUTS: Final = {name: _fields(fields) for name, (_, fields) in _KINDS_AND_FIELDS.items()}

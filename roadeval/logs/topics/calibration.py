@@ -53,6 +53,8 @@ def calibration_of(
     Its topic has the ``frame_id`` of the images; among several, its path shares most with theirs.
     The text is empty if the log has no calibration at all.
     """
+    if image_names(topics, readers):
+        return None, "each image has its own, and only the rates of KITTI's benchmark use it"
     lenses = {
         topic.name: _read_lens(topic, readers[topic.name], image)
         for topic in topics
@@ -88,6 +90,31 @@ def calibration_of(
         mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
         lens = replace(lens, frame_id=f"{frame}_optical")
     return replace(lens, mounting=mounting), Sentence("; ").join(notes)
+
+
+def image_names(topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader]) -> Sequence[str]:
+    """Return the names that the images had before they were packed; none if the log has none."""
+    names = [topic.name for topic in topics if topic.kind is TopicKind.NAMES and topic.count]
+    with suppress(*_UNREADABLE):
+        return [str(name) for topic in names for name in readers[topic].fields(0).names]
+    return ()
+
+
+def lens_at(
+    topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader], log_time_ns: int
+) -> Calibration | None:
+    """Return the calibration and mounting that have an image's log time, if there are any."""
+    lens, transforms = None, dict[str, Transform]()
+    with suppress(*_UNREADABLE):
+        for topic in topics:
+            reader, kind = readers[topic.name], topic.kind
+            for at in np.flatnonzero(reader.log_times == log_time_ns).tolist():
+                if kind is TopicKind.CALIBRATION:
+                    lens, _ = _lens_in(topic.name, reader.fields(at), topic)
+                elif kind is TopicKind.TRANSFORMS:
+                    transforms |= _transforms_in(reader.fields(at))
+        return lens and replace(lens, mounting=_find_mounting(lens.frame_id, transforms))
+    return None
 
 
 def shared_parts(one: str, other: str) -> int:
@@ -176,14 +203,17 @@ def _read_transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Tran
     for reader in readers:
         for position in range(min(len(reader), 100)):
             with suppress(*_UNREADABLE):
-                message = reader.fields(position)
-                for frame in getattr(message, "transforms", [message]):
-                    moved = getattr(frame, "transform", frame)
-                    at = np.array([getattr(moved.translation, axis) for axis in "xyz"], float)
-                    turn = np.array([getattr(moved.rotation, axis) for axis in "xyzw"], float)
-                    parent = getattr(frame, "header", None)
-                    parent = frame.parent_frame_id if parent is None else parent.frame_id
-                    yield str(frame.child_frame_id), (str(parent), at, turn)
+                yield from _transforms_in(reader.fields(position))
+
+
+def _transforms_in(message: Any) -> Iterator[tuple[str, Transform]]:
+    for frame in getattr(message, "transforms", [message]):
+        moved = getattr(frame, "transform", frame)
+        at = np.array([getattr(moved.translation, axis) for axis in "xyz"], float)
+        turn = np.array([getattr(moved.rotation, axis) for axis in "xyzw"], float)
+        parent = getattr(frame, "header", None)
+        parent = frame.parent_frame_id if parent is None else parent.frame_id
+        yield str(frame.child_frame_id), (str(parent), at, turn)
 
 
 def _find_mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting | None:

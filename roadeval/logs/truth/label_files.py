@@ -24,7 +24,7 @@ from roadeval.logs.truth import formats
 from roadeval.logs.truth.named_labels import LabelSet, NamedLabel
 from roadeval.logs.truth.picks import LABELS, PICK, PROPOSALS
 from roadeval.logs.truth.shapes import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
-from roadeval.runtime.discovery import collect
+from roadeval.runtime.discovery import collect, installed
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input
 
@@ -93,9 +93,11 @@ def _find_labels(
 
 @cache
 def _formats() -> dict[str, list[LabelFormat]]:
-    """Return the label formats by the endings of their files."""
+    """Return the label formats by the endings of their files, those of other packages last."""
     by_ending: dict[str, list[LabelFormat]] = {}
-    for format_ in chain(*collect(formats, "FORMATS")):
+    for format_ in chain(
+        *collect(formats, "FORMATS"), installed("label_formats", LabelFormat, LogError)
+    ):
         by_ending.setdefault(format_.ending, []).append(format_)
     return by_ending
 

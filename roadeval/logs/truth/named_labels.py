@@ -127,11 +127,18 @@ class NamedLabels:
 
 
 def find_keys(
-    origin: LabelSet, name: str, settings: LabelPlace, limits: Limits, frames: int | None = None
+    origin: LabelSet,
+    name: str,
+    settings: LabelPlace,
+    limits: Limits,
+    frames: int | None = None,
+    *,
+    named: Sequence[Path] = (),
 ) -> NamedLabels:
     """Find the key of each label by its name.
 
-    ``frames`` is the number of frames of the log, if it is certain. A `LogError` if a name has no
+    ``frames`` is the number of frames of the log, if it is certain; ``named`` are the names of its
+    images, if it has them, and used if a label has the name of one. A `LogError` if a name has no
     key, two labels have the same, or the digits or the first number are doubtful.
     """
     shown = {label.path: shown_name(label.path, name) for label in origin.labels}
@@ -139,8 +146,10 @@ def find_keys(
     if not names:
         problem = f"no label has a name as {settings.names}: {first_names([*shown.values()])}"
         raise LogError(problem, where=name, setting="truth.names")
-    images: list[Path] | None = None
-    if settings.images is not None:
+    images: Sequence[Path] | None = None
+    if settings.images is None and settings.pair is None and images_of([*names], named):
+        images = named
+    elif settings.images is not None:
         folder = Path(settings.images)
         images, _ = order_by_time(list_files(folder, IMAGES))  # the order of `pack`
         if len({image.stem for image in images}) < len(images):

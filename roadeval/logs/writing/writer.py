@@ -35,6 +35,7 @@ from roadeval.logs.files import (
 )
 from roadeval.logs.messages.pictures import turn_of
 from roadeval.logs.settings import NS
+from roadeval.logs.writing import kitti
 from roadeval.runtime.files import NewFile, check_input, writing
 from roadeval.version import VERSION
 
@@ -86,9 +87,18 @@ class LogWriter:
         if format not in (formats := ("jpeg", "png", "webp")):
             raise LogError(f"format {format!r} is none of {', '.join(formats)}", where=topic)
         message = CompressedImage(frame_id=frame_id, data=data, format=format)
-        message.timestamp.FromNanoseconds(stamp_ns)
-        data = message.SerializeToString(deterministic=True)
-        self._write(topic, _image_schema(), stamp_ns, log_time_ns, data)
+        self.message(topic, stamp_ns, message, log_time_ns)
+
+    def message(self, topic: str, stamp_ns: int, proto: Any, logged_ns: int | None = None) -> None:
+        """Write a message of Foxglove's protobuf schemas; its stamp is set."""
+        proto.timestamp.FromNanoseconds(stamp_ns)
+        data = proto.SerializeToString(deterministic=True)
+        self._write(topic, _schema_of(proto.__class__), stamp_ns, logged_ns, data)
+
+    def names(self, names: Sequence[str]) -> None:
+        """Write the names of all images, in their order: labels are found by them."""
+        schema = "roadeval.ImageNames", "jsonschema", b'{"type": "object"}'
+        self._write("/camera/names", schema, 0, None, json.dumps({"names": [*names]}).encode())
 
     def mask(
         self,
@@ -141,12 +151,11 @@ class LogWriter:
 
 
 @cache
-def _image_schema() -> Schema:
-    from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+def _schema_of(kind: Any) -> Schema:
     from mcap_protobuf.schema import build_file_descriptor_set
 
-    described = build_file_descriptor_set(CompressedImage).SerializeToString(deterministic=True)
-    return CompressedImage.DESCRIPTOR.full_name, "protobuf", described
+    described = build_file_descriptor_set(kind).SerializeToString(deterministic=True)
+    return kind.DESCRIPTOR.full_name, "protobuf", described
 
 
 ROOT: Final = "/roadeval"
@@ -294,7 +303,11 @@ def pack(
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
-    files, labels = list_files(images, IMAGES), _list_labels(masks, images) if masks else []
+    folder = images if kitti.is_road(images) else None
+    images = folder / kitti.IMAGES if folder else images
+    road_files = kitti.truth_files(folder) if folder and not masks else []
+    files = list_files(images, IMAGES)
+    labels = _list_labels(masks, images) if masks else road_files
     belong = images_of(labels, files)
     if labels and not belong:
         raise LogError(
@@ -313,12 +326,16 @@ def _pack_folder(
         times = [round(i * NS / rate) for i in range(len(files))]
     turned: list[Path] = []
     with LogWriter(output) as log:
+        if folder:
+            log.names([file.stem for file in files])
         for file, stamp in zip(files, times, strict=True):
             data, name = _image(file)
             turned += [file] * (orientation_of(data) != 1)
             log.image(CAMERA, stamp, data, name)
+            for topic, proto in kitti.messages(folder, file.stem, data, FRAME_ID) if folder else ():
+                log.message(topic, stamp, proto)
             if file in by_image:
-                label_file = _image(by_image[file], is_label=True)
+                label_file = _image(by_image[file], is_label=True, of_kitti=bool(road_files))
                 log.image(TRUTH, stamp, *label_file, log_time_ns=stamp + 1)  # after its image
     unpaired = {
         "images without a mask": [file for file in files if labels and file not in by_image],
@@ -375,7 +392,7 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
         raise LogError(f"not a readable video ({error.strerror})", where=video) from error
 
 
-def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
+def _image(file: Path, *, is_label: bool = False, of_kitti: bool = False) -> tuple[bytes, str]:
     """Read a JPEG or PNG file with any ending; a label must not be a JPEG."""
     try:
         check_input(file)
@@ -391,6 +408,8 @@ def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
             raise LogError(
                 f"{format_.name}, which not all viewers know: save it as PNG", where=file
             )
+        if of_kitti:
+            return png_of(kitti.road_mask(data)), "png"
         return data, format_.media_type.removeprefix("image/")
     except OSError as error:
         raise LogError(str(error.strerror), where=file) from error

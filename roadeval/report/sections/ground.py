@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from roadeval.data import BASELINE, UNFILTERED
-from roadeval.data.words import DASH, MINUS, defined, percent
+from roadeval.data.words import DASH, MINUS, defined, number, percent
 from roadeval.evaluation.metres import ABOVE, FREE, LEFT, RIGHT
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
@@ -15,6 +15,7 @@ from roadeval.report.captions import caption
 from roadeval.report.charts import standard as charts
 from roadeval.report.findings import Findings
 from roadeval.report.tables import variant_cell
+from roadeval.results.facts import Facts
 
 METRES: Final = "metres: "
 """The beginning of the sentence on the source of the camera."""
@@ -27,7 +28,10 @@ Measure = Mapping[Any, Any]
 
 
 def on_the_ground(findings: Findings) -> Iterator[Block]:
-    """Yield errors by distance, edges of the road and free distance; nothing without a camera."""
+    """Yield KITTI's rates, errors by distance, and the road's edges and end, if they are known."""
+    if findings.facts.kitti:
+        yield Heading("KITTI's road benchmark")
+        yield kitti_table(findings.facts)
     rows, names = findings.table("metres").to_dict("records"), [*findings.finals]
     if not rows:
         return
@@ -41,6 +45,23 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     flat = caption("camera", camera=source.removeprefix(METRES))
     sway = caption("posed camera" if _is_posed(rows) else "homography", unfiltered=UNFILTERED)
     yield Text(f"{flat} {sway}", "note")
+
+
+def kitti_table(facts: Facts) -> Table:
+    """Tabulate the rates of KITTI's road benchmark, by variant and category."""
+    rates = "MaxF", "AP11", "precision", "recall", "FPR", "FNR"
+    lines: list[list[Cell | str]] = [
+        [
+            variant_cell(variant, [*facts.finals]) if place == 0 else "",
+            *(category, number(row["frames"])),
+            *(percent(row.get(rate), 2) for rate in rates),
+        ]
+        for variant, rows in facts.kitti.items()
+        for place, (category, row) in enumerate(rows.items())
+    ]
+    heads = ["variant", "images", "frames", "MaxF", "AP", "PRE", "REC", "FPR", "FNR"]
+    breaks = [place for place, line in enumerate(lines) if place and line[0]]
+    return Table(heads, lines, (0, 1), breaks, caption=caption("kitti"), small=True)
 
 
 def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool = False) -> Table:

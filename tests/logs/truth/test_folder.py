@@ -96,6 +96,7 @@ def test_the_digest_tells_content_and_frame_not_the_place(tmp_path):
         ("bag:/net/road", ("bag", "/net/road")),
         ("a:b/masks", (None, None)),
         ("C:/masks", (None, None)),
+        (r"C:\x\a.mcap:/road", (r"C:\x\a.mcap", "/road")),
         ("masks", (None, None)),
         ("d/a.mcap", ("d/a.mcap", None)),
     ],
