@@ -50,8 +50,11 @@ def reading(path: Path, problem: str) -> Iterator[None]:
 
 def read_documents(folder: Path) -> tuple[bytes, bytes]:
     """Return the bytes of the JSON files; a `NetworkError` if one cannot be read."""
-    with reading(folder, f"cannot read {CONFIG} and {PREPROCESSOR} in it"):
-        return read_bounded(folder / CONFIG, MOST), read_bounded(folder / PREPROCESSOR, MOST)
+    contents = []
+    for name in (CONFIG, PREPROCESSOR):
+        with reading(folder / name, "a folder of Hugging Face needs it, and it cannot be read"):
+            contents.append(read_bounded(folder / name, MOST))
+    return contents[0], contents[1]
 
 
 def is_ultralytics(metadata: Mapping[str, str]) -> bool:

@@ -145,8 +145,9 @@ class OnnxFile:
         if settings is not None:
             name = f"{Path(settings.file).absolute().stem}.toml"
             error.draft = f"# Save as {name}, put a value in place of ?, and give --net NAME={name}"
+            usual = asdict(NetSettings()) | {"sha256": settings.sha256}
             for key, value in asdict(settings).items():
-                if value is not None and key != "sha256":
+                if value != usual[key]:
                     error.draft += f"\n{key} = {json.dumps(value, ensure_ascii=False)}"
             error.draft += f"\n{asked}"
         return error
