@@ -143,6 +143,11 @@ def test_names_can_stand_the_other_way_round(tmp_path):
     assert opened(folder).settings.road == (1,)
 
 
+def test_numbered_labels_and_names_of_no_class_are_no_names(tmp_path):
+    names = {"0": "LABEL_0", "1": "LABEL_1", "7": "road"}
+    assert refused(folder_of(tmp_path, {"id2label": names})).draft.endswith("road = [?]")
+
+
 UNUSABLE = {
     "a crop": ({"preprocessing": {"do_center_crop": True}}, "set do_center_crop to false"),
     "a filter": ({"preprocessing": {"resample": 1}}, "resample 1"),
