@@ -16,6 +16,7 @@ from pkgutil import iter_modules
 from types import ModuleType
 from typing import Final
 
+import generated
 import pdoc
 from pdoc import docstrings
 
@@ -57,10 +58,7 @@ def in_markdown(convert: Callable[[str], str]) -> Callable[[str], str]:
 def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
-    tables = (
-        schema.documentation(schema.OF_A_DRIVE, "csv"),
-        schema.documentation((*schema.OF_DRIVES, "frames"), "parquet"),
-    )
+    tables = generated.tables_of_a_drive(), generated.tables_of_a_fleet()
     schema.__doc__ = "\n".join((schema.__doc__ or "", *tables))
     docstrings.numpy = in_markdown(docstrings.numpy)
     warnings.simplefilter("error")

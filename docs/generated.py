@@ -12,7 +12,7 @@ import re
 import runpy
 import textwrap
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from inspect import getdoc, getsource
 from pathlib import Path
 from typing import Any, Final
@@ -169,12 +169,24 @@ def gate() -> str:
 
 def tables_of_a_drive() -> str:
     """Return the tables of a drive with their columns."""
-    return schema.documentation(schema.OF_A_DRIVE, "csv")
+    return documentation(schema.OF_A_DRIVE, "csv")
 
 
 def tables_of_a_fleet() -> str:
     """Return the tables of a fleet with their columns."""
-    return schema.documentation((*schema.OF_DRIVES, "frames"), "parquet")
+    return documentation((*schema.OF_DRIVES, "frames"), "parquet")
+
+
+def documentation(tables: Iterable[str], ending: str) -> str:
+    """Return the documentation of tables in files of an ending, in Markdown."""
+    parts = []
+    for table in (schema.TABLES[name] for name in tables):
+        columns = (*table.columns, *(table.of_a_fleet if ending == "parquet" else ()))
+        parts += [f"### {table.name}.{ending}", "", table.doc, ""]
+        parts += ["| column | holds | unit | meaning |", "| --- | --- | --- | --- |"]
+        parts += [f"| `{c.name}` | {c.kind} | {c.unit} | {c.doc} |" for c in columns]
+        parts.append("")
+    return "\n".join(parts)
 
 
 def rates() -> str:

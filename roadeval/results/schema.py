@@ -6,7 +6,7 @@ with its drive and camera, so tables of many drives are the concatenated tables 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -372,15 +372,3 @@ OF_A_DRIVE: Final = (*_OF_FRAMES, *_OF_SUMS)
 """The tables of one drive, in the order in which they are written."""
 OF_DRIVES: Final = (*_OF_DRIVES,)
 """The tables of a fleet beside ``frames``."""
-
-
-def documentation(tables: Iterable[str], ending: str) -> str:
-    """Return the documentation of tables in files of an ending, in Markdown."""
-    parts = []
-    for table in (TABLES[name] for name in tables):
-        columns = (*table.columns, *(table.of_a_fleet if ending == "parquet" else ()))
-        parts += [f"### {table.name}.{ending}", "", table.doc, ""]
-        parts += ["| column | holds | unit | meaning |", "| --- | --- | --- | --- |"]
-        parts += [f"| `{c.name}` | {c.kind} | {c.unit} | {c.doc} |" for c in columns]
-        parts.append("")
-    return "\n".join(parts)

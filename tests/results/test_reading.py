@@ -12,7 +12,7 @@ from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, windows
 from roadeval.results.rows import Key, csv_lines, sum_rows, table_of_scores
-from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES, documentation
+from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES
 from roadeval.results.tables import ResultsError, TableFacts, read_table
 from tests.evaluation.making import a_table, table_of
 from tests.results.making import KEY
@@ -173,10 +173,7 @@ def test_nothing_scored_has_no_scores():
 @pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
 def test_every_column_has_a_name_of_its_own_and_a_line_of_documentation(table):
     assert len(set(table.names)) == len(table.names)
-    for column in table.columns:
-        assert column.doc
-        text = documentation([table.name], "csv")
-        assert f"| `{column.name}` | {column.kind} | {column.unit} | {column.doc} |" in text
+    assert all(column.doc for column in table.columns)
 
 
 def test_every_table_begins_with_its_drive_and_camera_and_is_of_one_drive_or_of_many():
