@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.log_files import demo, info, pack
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.results.audit import audit
+    from roadeval.jobs.results.clip import clip
     from roadeval.jobs.results.compare import compare
     from roadeval.jobs.results.pick import pick
     from roadeval.jobs.results.report import write_figures, write_report
@@ -50,6 +51,7 @@ __all__ = [
     "RoadevalError",
     "RunConfig",
     "audit",
+    "clip",
     "compare",
     "config_toml",
     "configure",
@@ -74,6 +76,7 @@ _MODULES: Final = {
     "jobs.log_files": ("demo", "info", "pack"),
     "jobs.progress": ("Progress",),
     "jobs.results.audit": ("audit",),
+    "jobs.results.clip": ("clip",),
     "jobs.results.compare": ("compare",),
     "jobs.results.pick": ("pick",),
     "jobs.results.report": ("write_figures", "write_report"),

@@ -39,8 +39,7 @@ class Program(TyperGroup):
 
         Without options it fits a screen of 24 lines.
         """
-        formatter.write_text(self.help)
-        with formatter.section("Start here"):
+        with formatter.section(f"{self.help} Start here"):
             formatter.write_dl(START, WIDEST)
         self.format_commands(ctx, formatter)
         if with_options:

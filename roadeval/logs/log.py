@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import chain, islice
+from operator import itemgetter
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,7 +19,7 @@ from roadeval.data.words import counted
 from roadeval.images.formats import Limits
 from roadeval.logs.container.file import Container, Damage, containers_in, damage_of
 from roadeval.logs.container.records import MAGIC
-from roadeval.logs.errors import BadRecord, LogError, UnclearLabelsError
+from roadeval.logs.errors import BadRecord, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import content_problem, files_of
 from roadeval.logs.frames import (
     TRUTH,
@@ -37,6 +38,7 @@ from roadeval.logs.truth.audits import without_corrections
 from roadeval.logs.truth.label_files import labels_in
 from roadeval.logs.truth.meaning import LabelSource, class_names, log_and_topic, source_beside_log
 from roadeval.logs.truth.named_labels import find_keys, shown_name
+from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import visible
 
@@ -52,10 +54,13 @@ class RemoteLog:
     file: IO[bytes]
 
 
-def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> Log:
+def open_log(
+    path: str | Path | RemoteLog, config: LogConfig | None = None, *, every_topic: bool = False
+) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
-    A `LogError` if it is missing, unreadable, or no MCAP log.
+    By default messages of no use for a replay are only counted. A `LogError` if it is missing,
+    unreadable, or no MCAP log.
     """
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
@@ -80,7 +85,7 @@ def open_log(path: str | Path | RemoteLog, config: LogConfig | None = None) -> L
             for file in files
             for container in containers_in(
                 file,
-                lambda *channel: kind_of(*channel) is not TopicKind.OTHER,
+                lambda *channel: every_topic or kind_of(*channel) is not TopicKind.OTHER,
                 message_stamp,
                 opened=opened,
             )
@@ -362,6 +367,27 @@ class Log:
         if only is not None:
             numbers = [number for number in numbers if number in only]
         return FrameStream(selection, last - first, numbers, labelled=labelled)
+
+    def write_excerpt(self, topic: str, first: int, last: int, path: Path) -> None:
+        """Write the messages of all topics from 2 s before an image to the end of a later one.
+
+        Messages of before the span, as calibrations, stand at its beginning. Messages that cannot
+        be read are left out, see `losses`. A `LogError` if the file cannot be written.
+        """
+        images, times = self.readers[topic], self.readers[topic].log_times.tolist()
+        end = min([times[last] + NS, *(time - 1 for time in times[last + 1 : last + 2])])
+        span = times[first] - 2 * NS, end, images.stamp(last)
+        messages = [
+            (max(int(reader.log_times[position]), span[0]), reader, position)
+            for about in self.topics
+            if (reader := self.readers[about.name])
+            for position in reader.span(about.kind, *span)
+        ]
+        with LogWriter(path) as excerpt:
+            for log_time, reader, position in sorted(messages, key=itemgetter(0)):
+                with suppress(FrameError):
+                    _, channel, schema, _ = reader.carrier(position)
+                    excerpt.copy(channel, schema, reader.message(position), log_time)
 
     def close(self) -> None:
         """Close the files of the log, and of logs beside it."""

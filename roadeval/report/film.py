@@ -1,9 +1,9 @@
-"""A drive as a small video for a page: the camera, the truth and the masks of each frame.
+"""Frames as videos: a drive for a page with its camera, truth and masks, and clips of errors.
 
 Every picture of the video holds all panels of one frame beside each other, so one seek shows a
 frame of all of them. Truth, masks and probabilities are shades of grey; the page paints errors and
 masks over the camera, so any variant can be looked at, and any threshold. VP9 in WebM plays in
-every present browser; Debian's Chromium has no decoder for H.264.
+every present browser. A clip is for players and chats, too: H.264 in MP4, or a GIF.
 """
 
 from __future__ import annotations
@@ -16,8 +16,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import IGNORE
+from roadeval.data import ERRORS, IGNORE, NON_ROAD, ROAD, Rgb, Truth
 from roadeval.data.arrays import Plane
+from roadeval.data.colours import FN, FP, GREY, TP
+from roadeval.report.captions import caption
+from roadeval.report.images import LayerImage, paint
 
 CAMERA: Final = "camera"
 TRUTH_PANEL: Final = "truth"
@@ -32,6 +35,9 @@ _NARROW: Final = 320
 """Most pixels across a panel, by the number of panels, and of more panels."""
 _KEYFRAMES: Final = 10
 """Frames from one keyframe to the next: a seek decodes at most so many."""
+_CODECS: Final = {"webm": "libvpx-vp9", "mp4": "libx264", "gif": "gif"}
+_NAMED: Final = {"green": TP, "orange-red": FP, "pink": FN, "grey": GREY}
+"""The codecs of containers, and the colours of captions by their names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +95,10 @@ def make_film(
                 picture[top : top + height, left : left + width] = _fit(panel, width, height)
         return picture
 
-    content = _encode(map(mosaic, frames), len(frames), room)
+    # One quality, and less if it would not have room.
+    options = {"crf": "36", "deadline": "realtime", "cpu-used": "8", "row-mt": "0"}
+    options["b"] = str(int(8 * room * FPS / len(frames)))
+    content = encode(map(mosaic, frames), "webm", FPS, options)
     return Film(content, frames, panels, columns, width, height)
 
 
@@ -105,24 +114,55 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
     return np.asarray(fitted.reshape(height, width, -1), np.uint8)
 
 
-def _encode(pictures: Iterable[Plane], count: int, room: int) -> bytes:
-    """Encode pictures as VP9 of one quality, and of less quality if they would not have room."""
+def encode(pictures: Iterable[Plane], form: str, rate: Any, options: dict[str, str]) -> bytes:
+    """Encode pictures with even sides, ``rate`` a second, as ``webm``, ``mp4`` or ``gif``."""
     import av
 
     file = io.BytesIO()
-    # One thread: two of them may divide the work otherwise, and equal drives give equal pages.
-    options = {"crf": "36", "deadline": "realtime", "cpu-used": "8", "row-mt": "0"}
-    with av.open(file, "w", format="webm") as container:
+    # With this flag and one thread, equal pictures give equal bytes.
+    with av.open(file, "w", format=form, options={"fflags": "+bitexact"}) as container:
         stream = None
         for picture in pictures:
             if stream is None:
-                stream = container.add_stream("libvpx-vp9", rate=FPS, options=options)
+                stream = container.add_stream(_CODECS[form], rate=rate, options=options)
                 stream.height, stream.width = picture.shape[:2]
-                stream.pix_fmt, stream.thread_count = "yuv420p", 1
-                stream.gop_size = _KEYFRAMES
-                stream.bit_rate = int(8 * room * FPS / count)
+                stream.pix_fmt = "rgb8" if form == "gif" else "yuv420p"
+                stream.thread_count, stream.gop_size = 1, _KEYFRAMES
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
             container.mux(stream.encode(frame))
         if stream is not None:
             container.mux(stream.encode())
     return file.getvalue()
+
+
+def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) -> Rgb:
+    """Return panels with titles, 960 to 1920 pixels across, and a line on colours and drive."""
+    import cv2
+
+    painted = np.hstack([paint(panel) for panel in panels])
+    words = caption("errors" if panels[0].spec is ERRORS else "thumbnails without truth")
+    texts = [*words.rstrip(".").split("; "), about]
+    if truth is not None:
+        near_road = cv2.dilate((truth == ROAD).view(np.uint8), np.ones((3, 3), np.uint8))
+        painted[np.tile((near_road > 0) & (truth == NON_ROAD), len(panels))] = 255
+        texts.insert(-1, "white: the true road's edge")
+    height, width = painted.shape[:2]
+    across = min(width * -(-960 // width), 1920) // 2 * 2
+    titles = np.hstack([_line([panel.title], across // len(panels)) for panel in panels])
+    enlarged = _fit(painted, across, round(height * across / width / 2) * 2)
+    return np.vstack([titles, enlarged, _line(texts, across)])
+
+
+def _line(texts: Sequence[str], width: int) -> Rgb:
+    """Return a black line with texts in the colours that they name, in letters that fit."""
+    import cv2
+
+    font, gap, left = cv2.FONT_HERSHEY_SIMPLEX, 14, 7.0
+    sizes = [cv2.getTextSize(text, font, 0.5, 1)[0][0] + gap for text in texts]
+    small = min(1.0, (width - gap) / sum(sizes))
+    line = np.zeros((24, width, 3), np.uint8)
+    for text, size in zip(texts, sizes, strict=True):
+        colour = _NAMED.get(text.partition(":")[0].lower(), (255, 255, 255))
+        cv2.putText(line, text, (round(left), 17), font, 0.5 * small, colour, 1, cv2.LINE_AA)
+        left += size * small
+    return line

@@ -178,7 +178,7 @@ def test_no_command_at_all_shows_on_one_screen_what_to_type_first_as_wrong_usage
     assert shown.out == ""
     assert len(lines) <= 23
     assert max(map(len, lines)) <= 80
-    assert [line.split()[1] for line in lines[3:6]] == ["demo", "replay", "report"]
+    assert [line.split()[1] for line in lines[1:4]] == ["demo", "replay", "report"]
     assert lines[-2].startswith("Exit codes: ")
 
 

@@ -99,15 +99,19 @@ class FramePicker:
 
     def thumbnails(self, numbers: Sequence[int]) -> Iterator[LayerImage]:
         """Yield a picture of each frame: the errors of the focus, or without truth its mask."""
-        recording = self._recording
-        for frame in numbers if recording else ():
-            assert recording is not None
-            named = {variant.name: variant for variant in recording.variants}
-            focus = named[self._result.focus or focus_of(named) or ""]
-            final = next(spec for spec in focus.layers if spec.name == focus.stages[-1])
-            spec = ERRORS if frame in self._scored else final
-            layer = recording.layer(focus.name, spec.name, frame)
-            yield LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
+        if self._recording:
+            focus = self._result.focus or focus_of(v.name for v in self._recording.variants) or ""
+            for n in numbers:
+                yield replace(self.outcome(self._recording, focus, n), title=f"frame {n}")
+
+    def outcome(self, recording: Recording, variant: str, frame: int) -> LayerImage:
+        """Return the errors of a variant on a frame, or without truth its mask."""
+        (layout,) = (layout for layout in recording.variants if layout.name == variant)
+        (final,) = (spec for spec in layout.layers if spec.name == layout.stages[-1])
+        spec, image = ERRORS if frame in self._scored else final, recording.image(frame)
+        if (layer := self._result.layer(variant, spec.name, frame)) is None:
+            return LayerImage(f"{variant}: no mask", fade(image))
+        return LayerImage(f"{variant}: {spec.name}", image, spec, layer)
 
     def worst(self) -> list[NotableFrame]:
         """Return the worst frames of the focus, one a scene, all worse than the mean.
@@ -184,12 +188,8 @@ class FramePicker:
         image = recording.image(frame)
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, recording.truth(frame))
-        for name in (variant.name for variant in recording.variants[self._outcomes]):
-            errors = self._result.layer(name, ERRORS.name, frame)
-            if errors is None:
-                yield LayerImage(f"{name}: no mask", fade(image))
-            else:
-                yield LayerImage(f"{name}: errors", image, ERRORS, errors)
+        for variant in recording.variants[self._outcomes]:
+            yield self.outcome(recording, variant.name, frame)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.

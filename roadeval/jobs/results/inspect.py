@@ -65,7 +65,7 @@ def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
             raise _nothing_scored(fleet.path)
         return [_of_fleet(fleet, row) for row in records(fleet.worst[:count])]
     cameras = result.rig or [drive for drive in [result.drive] if drive]
-    frames = [frame for camera in cameras for frame in _ranked(camera, count or LISTED)]
+    frames = [frame for camera in cameras for frame in rank_frames(camera, count or LISTED)]
     frames = sorted(frames, key=lambda frame: -(frame.rates[frame.by] or 0.0))[: count or LISTED]
     frames = [replace(frame, rank=rank) for rank, frame in enumerate(frames, 1)]
     if not frames:
@@ -89,7 +89,7 @@ def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
     )
 
 
-def _ranked(
+def rank_frames(
     drive: DriveResult, count: int, among: Collection[int] | None = None
 ) -> list[WorstFrame]:
     """Rank a drive's frames, or those ``among`` them; none where ERR is undefined on all."""
@@ -172,7 +172,7 @@ def worst(drive: DriveResult) -> WorstFrame | None:
     """Return the worst frame of the focus that has pictures; None if none was scored."""
     if drive.focus is None:
         return None
-    return next(iter(_ranked(drive, 1, among=drive.pictured)), None)
+    return next(iter(rank_frames(drive, 1, among=drive.pictured)), None)
 
 
 def without_pictures(drive: DriveResult, frame: int) -> str:

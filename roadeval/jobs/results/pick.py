@@ -126,7 +126,7 @@ def open_drives(
 
     drives = []
     masks = config.override({"output": {"record": "masks", "figures": False}})
-    for number, path in enumerate(part for one in sources for part in _find_recordings(Path(one))):
+    for number, path in enumerate(part for one in sources for part in find_recordings(Path(one))):
         made, run = path, None
         if path.suffix != ".rrd":
             made, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
@@ -143,7 +143,7 @@ def open_drives(
     return drives
 
 
-def _find_recordings(source: Path) -> list[Path]:
+def find_recordings(source: Path) -> list[Path]:
     """Return the recordings that a fleet has kept, or that of a results folder; else itself."""
     if not is_fleet(source):
         if not (source / SUMMARY).is_file():

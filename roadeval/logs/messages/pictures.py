@@ -293,7 +293,7 @@ class Video:
         A `FrameError` if it, or a frame that it depends on, cannot be decoded.
         """
         if position not in self._ready and not 0 <= position - self._next <= PATIENCE:
-            keyframe = self._keyframe(position)
+            keyframe = self.keyframe(position)
             if position < self._next or keyframe > self._next:
                 self._begin(keyframe)
         while position not in self._ready and self._next <= position + PATIENCE:
@@ -309,7 +309,7 @@ class Video:
         self._next, self._damaged, self._ready = position, False, {}
         self._shown, self._steps = (position, 0), self._decode(position)
 
-    def _keyframe(self, position: int) -> int:
+    def keyframe(self, position: int) -> int:
         """Return the position of the last keyframe at or before ``position``."""
         for candidate in range(position, max(position - 3000, -1), -1):
             with suppress(FrameError):

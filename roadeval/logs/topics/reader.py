@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
@@ -345,8 +345,29 @@ class TopicReader:
         is_bad = [self.channels[n].container.is_bad(chunk) for n, chunk in chunks.tolist()]
         return int(counts[~np.array(is_bad, bool)].sum())
 
+    def carrier(self, position: int) -> FileChannel:
+        """Return the channel that carries a message."""
+        return self.channels[self._places[position, 1]]
+
+    def span(self, kind: TopicKind, begin: int, end: int, stamp: int) -> Iterator[int]:
+        """Yield the positions of the messages that belong to a span of log times.
+
+        Images up to 10 s later may be labels of it, if their stamps are at most ``stamp``.
+        """
+        low, high = np.searchsorted(self.log_times, (begin, end + 1)).tolist()
+        if kind is TopicKind.TRANSFORMS:
+            yield from range(min(low, 100))  # as many as a replay reads
+        elif kind in (TopicKind.CALIBRATION, TopicKind.CLASSES):
+            yield from range(max(low - 1, 0), low)
+        elif kind is TopicKind.VIDEO and low < high:
+            low = Video(self, self.limits).keyframe(low)
+        latest = np.searchsorted(self.log_times, end + 10 * NS) if kind in PICTURES else high
+        while high < latest and self.stamp(0) < self.stamp(high) <= stamp:
+            high += 1
+        yield from range(low, high)
+
     def _decoder(self, position: int) -> Decoder:
-        source = self.channels[self._places[position, 1]]
+        source = self.carrier(position)
         return decoder_for(source.channel, source.schema)
 
     def _error(self, position: int, reason: str) -> FrameError:

@@ -18,12 +18,15 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 import numpy as np
+from mcap.records import Channel
+from mcap.records import Schema as McapSchema
 from mcap.writer import Writer
 
 from roadeval.data import FrameResult
 from roadeval.data.arrays import Image
 from roadeval.images.decoding import orientation_of, png_of, size_of, upright
 from roadeval.images.formats import ImageError, Limits, format_of
+from roadeval.logs.container.records import Message
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import (
     IMAGES,
@@ -64,7 +67,7 @@ class LogWriter:
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[Schema, int] = {}
-        self._channels: dict[str, tuple[int, Iterator[int]]] = {}
+        self._channels: dict[Any, tuple[int, Iterator[int]]] = {}
         """The channel of each topic, and the numbers of its messages."""
 
     def image(
@@ -112,6 +115,18 @@ class LogWriter:
         """Write a ``(H, W)`` mask, or an RGB or RGBA image, as a PNG; errors as in `image`."""
         png = png_of(mask)
         self.image(topic, stamp_ns, png, "png", log_time_ns=log_time_ns, frame_id=frame_id)
+
+    def copy(self, channel: Channel, about: McapSchema | None, message: Message, at: int) -> None:
+        """Write another log's message at a log time; a `LogError` if the disk is full."""
+        if (key := (str(channel), about and about.data)) not in self._channels:
+            described = (about.name, about.encoding, about.data) if about else None
+            schema = self._writer.register_schema(*described) if described else 0
+            names = channel.topic, channel.message_encoding
+            made = self._writer.register_channel(*names, schema, channel.metadata)
+            self._channels[key] = made, count()
+        (made, _), data = self._channels[key], bytes(message.data)
+        with writing(self.path, LogError):
+            self._writer.add_message(made, at, data, message.publish_time, message.sequence)
 
     def _write(
         self, topic: str, schema: Schema, stamp_ns: int, log_time_ns: int | None, data: bytes

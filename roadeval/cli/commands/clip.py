@@ -1,0 +1,48 @@
+"""``roadeval clip``: short films of what fails."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli.arguments import option
+from roadeval.cli.commands.inspect import Results
+
+
+def _span(text: str) -> range:
+    if not (match := re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)):
+        raise ValueError(f"{text}: write the first and the last frame, as 40:80")
+    return range(int(match[1]), int(match[2]) + 1)
+
+
+def clip(
+    result: Results,
+    *,
+    output: Annotated[
+        Path, option("-o --output", "Folder, or the .mp4 or .gif of one clip.", "FOLDER|FILE")
+    ] = Path("clips"),
+    worst: Annotated[int | None, option("--worst", "Worst scenes. Default: 5.", "K", min=1)] = None,
+    frames: Annotated[range | None, option("--frames", "Only these.", "A:B", parser=_span)] = None,
+    focus: arguments.Focus = None,
+    mcap: Annotated[bool, option("--mcap", "Also the log's own messages, as a log.")] = False,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Film what fails, for people who do not have the data.
+
+        roadeval clip recordings/drive.rrd
+        roadeval clip recordings/drive.rrd --frames 40:80 -o turn.mp4 --mcap
+
+    Each shows 2 s before and after the worst frame of a scene: the errors of the focus, and beside
+    them those of the best other variant. The messages begin 2 s earlier, and 'replay' opens them.
+    """
+    from roadeval.jobs.results.clip import clip as run
+
+    with progress.show(quiet) as watch:
+        films, losses = run(
+            *(result, output), worst=worst, frames=frames, focus=focus, mcap=mcap, on_progress=watch
+        )
+    for film in films if not quiet else ():
+        console.emit(f"{film}, {film.with_suffix('.mcap')}" if mcap else str(film))
+    return messages.losses(losses)

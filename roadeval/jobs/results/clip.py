@@ -1,0 +1,127 @@
+"""Short films of the frames on which a result fails, and the log's own messages of these."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+
+from roadeval.data import Rgb, as_plain
+from roadeval.data.words import percent
+from roadeval.errors import RoadevalError
+from roadeval.fleet.remote import open_source
+from roadeval.jobs.outputs import holding
+from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.jobs.results.frames import FramePicker, facts_of
+from roadeval.jobs.results.inspect import rank_frames
+from roadeval.jobs.results.pick import find_recordings
+from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.logs.log import open_log
+from roadeval.report.film import clip_picture, encode
+from roadeval.results.facts import focus_of
+from roadeval.results.verdict import lowest
+from roadeval.runtime.files import AnyPath, put, writing
+
+
+def clip(
+    result: AnyPath,
+    output: AnyPath = "clips",
+    *,
+    worst: int | None = None,
+    frames: Container[int] | None = None,
+    focus: str | None = None,
+    mcap: bool = False,
+    on_progress: OnProgress = ignore,
+) -> tuple[list[Path], list[str]]:
+    """Write short films of where a result fails; return them, and the losses of the log, if any.
+
+    Errors are painted over the camera, those of the ``focus`` on the left, of the best other
+    variant beside it. The result is a recording, the folder of its results, or a fleet; the output
+    a folder, or the MP4 or GIF of one clip. Each of the ``worst`` 5 scenes is filmed, or these
+    ``frames``, as ``range(40, 81)``. With ``mcap`` the log's own messages lie beside each clip. A
+    `RoadevalError` if there are no pictures, or a file cannot be written.
+    """
+    place, films, losses = Path(output), list[Path](), list[str]()
+    form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
+    results = [Result(path, focus=focus) for path in find_recordings(Path(result))]
+    drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
+    scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
+    if not scenes or (form and len(scenes) > 1):
+        one, none = "a file holds one clip: name a folder", "no pictures of such frames were kept"
+        raise RoadevalError(one if scenes else none, where=place if scenes else result)
+    # With its matrix stated, no player guesses it from the size.
+    options = {"crf": "20", "preset": "veryfast", "colorspace": "smpte170m"}
+    total = sum(len(numbers) for _, numbers, _ in scenes)
+    steps = map(on_progress, (Progress(done, total, "filming") for done in count(1)))
+    for drive, numbers, name in scenes:
+        path = place if form else place / f"{name}.mp4"
+        log = path.with_suffix(".mcap") if mcap else None
+        with holding(path, log, inputs=[result, drive.path]), writing(path, RoadevalError):
+            losses += _write_log(drive, numbers, log) if log else ()
+            rate, pictures = _film(drive, numbers, steps)
+            put(path, encode(pictures, form or "mp4", rate, options))
+        films.append(path)
+    return films, [*dict.fromkeys(losses)]
+
+
+def _scenes(
+    drives: Sequence[DriveResult], number: int, frames: Container[int] | None
+) -> Iterator[tuple[DriveResult, list[int], str]]:
+    """Yield the drive, the frames and the name of each clip."""
+    ranked = []
+    for drive in drives:
+        if frames is None:
+            ranked += [(drive, frame) for frame in rank_frames(drive, number, drive.pictured)]
+        elif numbers := [frame for frame in drive.pictured if frame in frames]:
+            yield drive, numbers, f"{as_plain(drive.title)}-{numbers[0]:04d}-{numbers[-1]:04d}"
+    ranked.sort(key=lambda pair: -(pair[1].rates[pair[1].by] or 0.0))
+    for drive, worst in ranked[:number]:
+        times = drive.recording.stamps if drive.recording else {}
+        stamps = np.array([times[frame] for frame in drive.pictured])
+        near = abs(stamps - worst.stamp_ns) <= max(2e9, 2.5 * np.ptp(stamps) / len(stamps))
+        numbers = np.array(drive.pictured)[near].tolist()
+        yield drive, numbers, f"{as_plain(drive.title)}-{worst.frame:04d}"
+
+
+def _film(
+    drive: DriveResult, frames: Sequence[int], steps: Iterator[None]
+) -> tuple[Fraction, Iterator[Rgb]]:
+    """Return frames a second, 2 to 30, and the pictures: the focus, and the best other variant."""
+    recording, picker = drive.recording, FramePicker(drive)
+    assert recording is not None
+    variants = [variant.name for variant in recording.variants]
+    focus, totals, final = focus_of(variants, drive.focus), drive.facts.totals, drive.facts.finals
+    best = lowest({n: totals[n][final[n]] for n in final if n in variants and n != focus})
+    shown = [*dict.fromkeys(filter(None, [focus, best, *variants]))][:2]
+    rows = facts_of(drive) if len(drive.rows) else ()
+    rates_of = {(row.frame, name): row.rates[name] for row in rows for name in row.rates}
+    span_s = (recording.stamps[frames[-1]] - recording.stamps[frames[0]]) / 1e9
+    rate = min(max((len(frames) - 1) / max(span_s, 0.001), 2), 30)
+    speed = f"{span_s * rate / (len(frames) - 1):.1f}" if span_s > 0 else "1.0"
+    about = drive.title if speed == "1.0" else f"{drive.title}, {speed} x speed"
+
+    def picture(frame: int) -> Rgb:
+        next(steps)
+        panels = []
+        for name in shown:
+            panel, rates = picker.outcome(recording, name, frame), rates_of.get((frame, name), {})
+            numbers = ", ".join(f"{rate} {percent(value)} %" for rate, value in rates.items())
+            panels.append(replace(panel, title=f"frame {frame}, {name}: {numbers or 'not scored'}"))
+        return clip_picture(panels, drive.truth(frame), about)
+
+    return Fraction(round(100 * rate), 100), map(picture, frames)
+
+
+def _write_log(drive: DriveResult, frames: Sequence[int], path: Path) -> tuple[str, ...]:
+    """Write the log's own messages of frames; return the losses of the log."""
+    if (about := drive.facts.log) is None:
+        raise RoadevalError("a partial recording, which names no log", where=drive.path)
+    with open_log(open_source(about.path), every_topic=True) as log:
+        if log.digest != about.digest:
+            raise RoadevalError("another log than that of this result", where=about.path)
+        log.write_excerpt(str(drive.properties["image_topic"]), frames[0], frames[-1], path)
+        return log.losses
