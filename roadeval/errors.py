@@ -36,6 +36,8 @@ class RoadevalError(Exception):
         """The next step that helps."""
         self.in_file = False
         """Whether settings stand in a file, where flags do not name them."""
+        self.draft = ""
+        """Lines of a file that mends it, once they are completed."""
 
     @classmethod
     def of(cls, error: RoadevalError, where: object = "", *, in_file: bool = False) -> Self:

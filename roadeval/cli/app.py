@@ -95,7 +95,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def explain(error: BaseException) -> int:
-    """Write why the command ended, in one line, and return its exit code.
+    """Write why the command ended, in one line and a draft that mends it; return its exit code.
 
     If ``ROADEVAL_DEBUG=1`` is in the environment, the traceback comes first.
     """
@@ -124,7 +124,7 @@ def explain(error: BaseException) -> int:
             code, sentence = ExitCode.FAILED, memory.LACKING
         case _:
             code, sentence = ExitCode.DEFECT, defect(error)
-    messages.error(_with_notes(sentence, error))
+    messages.error(_with_notes(sentence, error), getattr(error, "draft", ""))
     if isinstance(error, console.OutputError):
         console.drop()
     return code

@@ -15,9 +15,11 @@ from roadeval.runtime.text import debug, visible, visible_lines, without_secrets
 PROGRAM: Final = "roadeval"
 
 
-def error(sentence: str) -> None:
-    """Write an error: ``roadeval: error: ...``."""
+def error(sentence: str, draft: str = "") -> None:
+    """Write an error, ``roadeval: error: ...``, and below it the draft of a file that mends it."""
     _write("error", "bold red", sentence)
+    if draft:
+        sys.stderr.write(f"\n{visible_lines(draft)}\n")
 
 
 def warning(sentence: str) -> None:

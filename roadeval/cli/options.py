@@ -40,7 +40,7 @@ class MethodSettings:
     config: File of settings on top of the preset: an edited output of 'roadeval config', the
         run.toml of an earlier run, or the recording of that run.
     variants: Further variant: a preset, as robust, or a file of settings.
-    nets: Network as a further variant: an ONNX file, or a TOML file that names one.
+    nets: Network as a further variant: an ONNX file, a Hugging Face folder, or a TOML file.
     masks: Masks as a further variant: a folder, LOG.mcap:/topic, or a TOML file.
     tunes: Method, as a network, that is corrected in a further variant NAME_tuned, which learns
         from this drive's first labelled frames. Its trees use the method's output and all features

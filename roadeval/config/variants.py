@@ -223,7 +223,7 @@ def check_variant_name(name: str, taken: Collection[str]) -> None:
 def network_variant(name: str, path: str) -> Variant:
     """Return the variant of a network, whose mask phase 4 leaves as it is.
 
-    ``path`` is an ONNX file, or a TOML file with the settings of the stage ``net``, in which
+    ``path`` is a network, or a TOML file with the settings of the stage ``net``, in which
     ``file`` is relative to the folder of the TOML file, and ``[post]`` asks for post-processing.
     The network itself is opened when it is run. A `ConfigError` if a TOML file cannot be used.
     """

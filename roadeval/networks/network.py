@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import ast
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
 from functools import lru_cache, reduce
 from itertools import chain
+from pathlib import Path
 from typing import Any, Final, Literal, Self
 
 import cv2
@@ -14,10 +16,12 @@ import numpy as np
 
 from roadeval.data import CERTAIN, Output, Packed, Probability, Rgb
 from roadeval.data.arrays import Values, sigmoid
-from roadeval.networks.onnx_file import Array, OnnxFile, Tensor, load
+from roadeval.data.words import first_of
+from roadeval.networks.makers import is_ultralytics
+from roadeval.networks.onnx_file import SHOWN, Array, OnnxFile, Tensor, load
 from roadeval.networks.settings import MIB, NetSettings
 from roadeval.runtime.sentence import Sentence, Setting
-from roadeval.runtime.text import visible
+from roadeval.runtime.text import elide, visible
 from roadeval.runtime.threads import map_ordered
 
 
@@ -49,14 +53,17 @@ class Network:
         `NetworkError` if the network fails on the image, or gives NaN or another shape than for
         other images.
         """
-        settings = self.settings
         frame = image.shape[1], image.shape[0]
+        settings = fit_size(self.settings, frame)
+        shapes = self.shapes
+        if settings.size != self.settings.size:
+            shapes = tuple(sample.shape for sample in samples_of(settings, self.file))
         values = input_values(fit_image(image, settings), settings, self.file.inputs[0].dtype)
         outputs = self.file.run(values, settings.outputs or (), settings.seconds)
-        for name, output, shape in zip(settings.outputs or (), outputs, self.shapes, strict=True):
+        for name, output, shape in zip(settings.outputs or (), outputs, shapes, strict=True):
             if output.shape != shape:
                 raise self.file.error(_VARIES.format(name, output.shape, shape))
-        pairs = [self._codes(output, frame) for output in outputs]
+        pairs = [self._codes(output, frame, settings) for output in outputs]
         codes = np.maximum.reduce([total for total, _ in pairs])
         limit = round((0.5 if settings.threshold is None else settings.threshold) * CERTAIN)
         by_class = tuple(chain(*zip(*(single for _, single in pairs), strict=True)))
@@ -73,18 +80,41 @@ class Network:
         licence = self.file.metadata.get("license") or self.file.metadata.get("licence") or ""
         return {
             "onnxruntime": __version__,
-            "file": self.file.path.name,
+            "file": Path(self.settings.file).absolute().name,
             "sha256": self.file.sha256,
             "licence": visible(" ".join(licence.split())) or None,
             "inputs": [*map(str, self.file.inputs)],
             "outputs": [*map(str, self.file.outputs)],
             "taken_for": TAKEN_FOR.get(self.settings.activation or "", "logits"),
             "road": [*map(str, self.settings.road or ())],
+            "reading": self.reading(),
         }
 
-    def _codes(self, output: Array, frame: Size) -> tuple[Probability, list[Probability]]:
+    def reading(self) -> str:
+        """Return what is taken: ``road = class 0 "road" of 19; letterbox 8x8; logits at 1/4``."""
+        settings, file = self.settings, self.file
+        assert settings.size is not None
+        scores = as_scores(np.empty(self.shapes[0], np.int8), settings.layout)
+        assert scores is not None
+        count = len(file.names) if settings.activation == "classes" else len(scores)
+        road = f"class{'es' * (len(settings.road or ()) > 1)} "
+        road += ", ".join(name_class(number, file) for number in settings.road or ())
+        if count == 1:
+            road = f"its only class, {name_class(0, file)}"
+        elif count:
+            road += f" of {count}"
+        way = "letterbox" if settings.resize == "letterbox" else "stretched to"
+        size = "{}x{}".format(*settings.size)
+        smaller = f" or less, by steps of {settings.stride}" if settings.stride else ""
+        kind = TAKEN_FOR.get(settings.activation or "", "logits")
+        share = Fraction(scores.shape[1], settings.size[1])
+        at = "full size" if share == 1 else share
+        return f"road = {road}; {way} {size}{smaller}; {kind} at {at}"
+
+    def _codes(
+        self, output: Array, frame: Size, settings: NetSettings
+    ) -> tuple[Probability, list[Probability]]:
         """Return the codes of road, and the codes of each of its classes, if they are graded."""
-        settings = self.settings
         scores = as_scores(output, settings.layout)
         assert scores is not None
         if not np.isfinite(scores).all():
@@ -96,7 +126,9 @@ class Network:
             raise self.file.error("leaves 0 to 1, so it gives no probabilities", see)
         if settings.activation == "classes":
             road = np.isin(scores[0], settings.road or ()).astype(np.uint16)
-            nearest = cv2.INTER_NEAREST if is_ultralytics(self.file) else cv2.INTER_NEAREST_EXACT
+            nearest = (
+                cv2.INTER_NEAREST if is_ultralytics(self.file.metadata) else cv2.INTER_NEAREST_EXACT
+            )
             return resize_to_frame(CERTAIN * road, frame, settings, nearest), []
 
         def plane(number: int) -> Values:
@@ -178,6 +210,18 @@ def inside(frame: Size, settings: NetSettings) -> tuple[slice, slice]:
     return rows, columns
 
 
+def fit_size(settings: NetSettings, frame: Size) -> NetSettings:
+    """Return settings with the size of the input for a frame; it differs if there is a stride."""
+    if settings.stride is None or settings.resize != "letterbox" or settings.size is None:
+        return settings
+    rows, columns = inside(frame, settings)
+    width, height = (
+        part.stop - part.start + (full - part.stop + part.start) % settings.stride
+        for part, full in zip((columns, rows), settings.size, strict=True)
+    )
+    return replace(settings, size=(width, height))
+
+
 def fit_image(image: Rgb, settings: NetSettings) -> Rgb:
     """Return the input's pixels, ``(h, w, 3)`` uint8, for an ``(H, W, 3)`` uint8 frame."""
     assert settings.size is not None
@@ -186,21 +230,11 @@ def fit_image(image: Rgb, settings: NetSettings) -> Rgb:
     if not settings.antialias:
         inner[...] = cv2.resize(image, inner.shape[1::-1], interpolation=cv2.INTER_LINEAR)
         return pixels
-    down, right = (
-        bilinear_weights(*sides) for sides in zip(image.shape[:2], inner.shape[:2], strict=True)
-    )
-    across = np.rint(np.matmul(right, image.astype(np.float32)))
-    inner[...] = np.rint(np.tensordot(down, across, 1))
+    from PIL import Image
+
+    how = Image.Resampling[str(settings.antialias).upper().replace("TRUE", "BILINEAR")]
+    inner[...] = np.asarray(Image.fromarray(image).resize(inner.shape[1::-1], how))
     return pixels
-
-
-def bilinear_weights(length: int, to: int) -> Values:
-    """Return the ``(to, length)`` weights of Pillow's bilinear filter, a triangle."""
-    ratio = length / to
-    middle = (np.arange(to)[:, None] + 0.5) * ratio
-    weights = np.maximum(1 - np.abs(np.arange(length) + 0.5 - middle) / max(ratio, 1), 0)
-    shares: Values = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
-    return shares
 
 
 def resize_to_frame(plane: Array, frame: Size, settings: NetSettings, how: int) -> Array:
@@ -220,16 +254,18 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
         image = image[..., ::-1]
     elif settings.channels == "grey":
         image = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)[..., None]
-    mean = np.array(settings.mean, np.float64)
-    deviation = np.array(settings.deviation, np.float64)
-    factor = (np.float64(settings.scale or 1) / deviation).astype(np.float32)
-    values = image * factor - (mean / deviation).astype(np.float32)
+    levels = np.arange(256)[:, None] * (settings.scale or 1) - np.array(settings.mean)
+    table = np.broadcast_to(levels / np.array(settings.deviation), (256, image.shape[2]))
     if np.dtype(dtype).kind == "u":
-        values = np.clip(np.rint(values), 0, 255)
+        table = np.clip(np.rint(table), 0, 255)
+    values = np.take_along_axis(table.astype(dtype), image.reshape(-1, image.shape[2]), 0)
+    values = values.reshape(image.shape)
     planes = values.transpose(2, 0, 1) if settings.layout == "NCHW" else values
     return np.ascontiguousarray(planes[None], dtype)
 
 
+STATED: Final = ("resize", "antialias", "layout", "channels", "scale", "mean", "deviation")
+"""Settings that hold as the makers state them, whatever the shapes are."""
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
 
@@ -248,13 +284,15 @@ def complete_settings(settings: NetSettings, file: OnnxFile) -> NetSettings:
                 "name an output that is a map by {net.outputs}"
             ),
         )
-    usual: Literal["stretch", "letterbox"] = "letterbox" if is_ultralytics(file) else "stretch"
-    settings = replace(settings, sha256=file.sha256, resize=settings.resize or usual)
-    settings = complete_input(settings, file)
+    task = visible(file.metadata.get("task", "semantic"))
+    if is_ultralytics(file.metadata) and task != "semantic":
+        raise file.question(f"is for the task {task}, and gives no map of classes")
+    settings = complete_input(replace(settings, sha256=file.sha256), file)
     names = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(names) > 1:
         name_them = Sentence("name those that show road by {net.outputs}")
-        raise file.question("gives several outputs", name_them, f'outputs = ["{names[0]}"]')
+        asked = f"outputs = [?]  # some of {', '.join(map(json.dumps, names[:SHOWN]))}"
+        raise file.question("gives several outputs", name_them, asked, settings)
     outputs = settings.outputs or names
     if unknown := [name for name in outputs if name not in names]:
         see = Sentence("see {net.outputs}")
@@ -354,11 +392,6 @@ def make_test_images(settings: NetSettings) -> Iterator[Rgb]:
         yield cv2.resize(colours, settings.size, interpolation=cv2.INTER_LINEAR)
 
 
-def is_ultralytics(file: OnnxFile) -> bool:
-    """Return whether a file comes from Ultralytics, by its metadata."""
-    return file.metadata.get("author") == "Ultralytics"
-
-
 def has_instances(file: OnnxFile) -> bool:
     """Return whether a file finds objects one by one, by its metadata or its outputs.
 
@@ -372,15 +405,6 @@ def has_instances(file: OnnxFile) -> bool:
         or any(word in names for word in ("queries", "boxes", "dets", "pred_masks"))
         or (bool(maps) and any(len(shape) == 3 and shape[1:] not in maps for shape in shapes))
     )
-
-
-def class_names(file: OnnxFile) -> dict[int, str]:
-    """Return the names of classes by number, from a file's metadata."""
-    try:
-        names = dict(ast.literal_eval(file.metadata.get("names", "{}")))
-        return {int(number): str(name).lower() for number, name in names.items()}
-    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
-        return {}
 
 
 def as_scores(output: Array, layout: str | None) -> Array | None:
@@ -397,33 +421,53 @@ def as_scores(output: Array, layout: str | None) -> Array | None:
     return array if array.ndim == 3 and len(array) and min(array.shape[1:]) > 1 else None
 
 
+def check_image(file: OnnxFile) -> None:
+    """Raise a `NetworkError` if the input is no image."""
+    taken = file.inputs[0]
+    shape = taken.shape if len(file.inputs) == 1 else ()
+    if len(shape) == 4 and (shape[0] or 1) > 1:
+        raise file.question(f"takes {shape[0]} images at once: export it with a batch of one")
+    if len(shape) == 4 and taken.dtype == "int8":
+        raise file.question("takes int8 by a scale that it does not state: export float inputs")
+    if len(shape) != 4 or taken.dtype not in FED:
+        raise file.question("takes no image: that is one input of four lengths, the first one 1")
+
+
 def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """Complete the settings of the input."""
-    shape = file.inputs[0].shape if len(file.inputs) == 1 else ()
-    if len(shape) != 4 or shape[0] not in (None, 1) or file.inputs[0].dtype not in FED:
-        raise file.question("takes no image: that is one input of four lengths, the first one 1")
+    check_image(file)
+    shape, dtype = file.inputs[0].shape, file.inputs[0].dtype
+    stated = asdict(file.stated)
+    unset = (name for name in STATED if getattr(settings, name) is None)
+    settings = replace(settings, **{name: stated[name] for name in unset})
     layout = settings.layout or ("NCHW" if shape[1] in (1, 3) else "NHWC")
     count, rows, columns = shape[1:] if layout == "NCHW" else (shape[3], shape[1], shape[2])
-    if settings.layout is None and count not in (1, 3):
-        give = Sentence("give it by {net.layout}")
-        problem = "does not say the order of its input's lengths"
-        raise file.question(problem, give, 'layout = "NCHW"')
-    width, height = settings.size or (columns, rows)
-    if width is None or height is None:
-        give = Sentence("give width and height by {net.size}")
-        raise file.question("takes images of any size", give, "size = [512, 256]")
-    if columns not in (None, width) or rows not in (None, height):
-        see = Sentence("see {net.size}")
-        raise file.question(f"takes no input of {width}x{height}", see)
     settings = replace(
         settings,
-        layout=layout,
+        resize=settings.resize or "stretch",
+        antialias=settings.antialias or False,
         channels=settings.channels or ("grey" if count == 1 else "rgb"),
-        size=(width, height),
-        scale=settings.scale or (1.0 if file.inputs[0].dtype == "uint8" else 1 / 255),
+        scale=settings.scale or (1.0 if dtype == "uint8" else 1 / 255),
         mean=settings.mean or (0.0,),
         deviation=settings.deviation or (1.0,),
     )
+    if settings.layout is None and count not in (1, 3):
+        give = Sentence("give it by {net.layout}")
+        problem = "does not say the order of its input's lengths"
+        raise file.question(problem, give, 'layout = ?  # "NCHW" or "NHWC"', settings)
+    settings = replace(settings, layout=layout)
+    size = settings.size or ((columns, rows) if columns and rows else file.stated.size)
+    if size is None:
+        give = Sentence("give width and height by {net.size}")
+        asked = "size = [?, ?]  # width and height, such as [512, 256]"
+        raise file.question("takes images of any size", give, asked, settings)
+    width, height = size
+    if columns not in (None, width) or rows not in (None, height):
+        see = Sentence("see {net.size}")
+        raise file.question(f"takes no input of {width}x{height}", see)
+    if columns is None and rows is None and settings.size is None:
+        settings = replace(settings, stride=settings.stride or file.stated.stride)
+    settings = replace(settings, size=size)
     if count not in (None, expected := settings.channel_count):
         raise file.question(
             f"its input has {count} channels, and {settings.channels} has {expected}"
@@ -463,11 +507,7 @@ def complete_output(
     usual = "none" if is_probable(sample.low, sample.high) else usual
     above = settings.threshold is not None or count == 1
     decide = settings.decide or ("threshold" if above else "argmax")
-    named = tuple(n for n, name in class_names(file).items() if name == "road" and n < count)
-    road = settings.road or named or ((count - 1,) if count <= 2 else ())
-    if not road:
-        give = Sentence("give the numbers of those that are road by {net.road}")
-        raise file.question(f"tells {count} classes apart", give, "road = [1]")
+    road = choose_road(settings, file, f"tells {count} classes apart", count)
     if max(road) >= count:
         see = Sentence("see {net.road}")
         raise file.question(f"has no class {max(road)}, but {count} from 0", see)
@@ -490,11 +530,37 @@ def complete_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSet
     if settings.threshold is not None:
         leave = Sentence("leave {net.threshold} out")
         raise file.question(f"its output {name!r} holds only classes", leave)
-    names = class_names(file)
-    road = settings.road or tuple(n for n, name in names.items() if name == "road")
-    if is_ultralytics(file) and len(names) == 1:
-        road = (1,)  # a single class is written as 1, whatever its number is
-    if not road:
-        give = Sentence("give the numbers of those that are road by {net.road}")
-        raise file.question("gives numbers of classes", give, "road = [1]")
+    if is_ultralytics(file.metadata) and len(file.names) == 1:
+        settings = replace(settings, road=(1,))  # it is written as 1, whatever its number is
+    road = choose_road(settings, file, "gives numbers of classes")
     return replace(settings, road=road, activation="classes", decide="argmax")
+
+
+LIKE_ROAD: Final = ("road", "driv", "street", "lane", "asphalt", "highway", "carriageway")
+"""Parts of names of classes that may be road."""
+
+
+def choose_road(
+    settings: NetSettings, file: OnnxFile, problem: str, count: int | None = None
+) -> tuple[int, ...]:
+    """Return the classes of road: those that settings name, those called road, or the last of two.
+
+    A `NetworkError` that begins with the problem, and names those like road, if there are none.
+    """
+    names = {n: name for n, name in file.names.items() if count is None or n < count}
+    default = (count - 1,) if count == 1 or (count == 2 and not names) else ()
+    if road := settings.road or tuple(n for n in names if names[n] == "road") or default:
+        return road
+    like = [n for n, name in names.items() if any(part in name for part in LIKE_ROAD)]
+    listed = first_of([name_class(n, file) for n in like or names], SHOWN)
+    give = Sentence("give the numbers of those that are road by {net.road}")
+    if listed:
+        problem = f"{problem}, none of them called road"
+        give = Sentence("{}: {} {}", give, "maybe" if like else "they are", listed)
+    raise file.question(problem, give, f"road = [?]{f'  # {listed}' if listed else ''}", settings)
+
+
+def name_class(number: int, file: OnnxFile) -> str:
+    """Return the number of a class with its name, if it has one: ``0 "road"``."""
+    name = file.names.get(number)
+    return str(number) if name is None else f'{number} "{elide(name, 40)}"'

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
@@ -19,6 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.words import first_of
+from roadeval.networks import makers
+from roadeval.networks.makers import reading
 from roadeval.networks.settings import MIB, NetSettings, NetworkError
 from roadeval.runtime.documents import protobuf_fields
 from roadeval.runtime.files import check_input
@@ -34,7 +36,7 @@ QUOTED: Final = 240
 """Letters of onnxruntime's error that a message quotes."""
 LARGEST: Final = (1 << 31) - 1
 """Bytes that a protobuf file can have; larger weights lie in files beside it."""
-_SHOWN: Final = 12
+SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
 _LATE: Final = "takes longer than {:g} s{} to {}, or has no end"
 _MORE_TIME: Final = Sentence("mend it, or allow more by {net.seconds}")
@@ -79,11 +81,15 @@ class OnnxFile:
     session: Any
     sha256: str
     """Digest of its bytes, followed by the bytes of weight files beside it in the order of their
-    names."""
+    names, and of the JSON files of its Hugging Face folder."""
     inputs: tuple[Tensor, ...]
     """Its inputs, without its weights."""
     outputs: tuple[Tensor, ...]
     metadata: Mapping[str, str]
+    names: Mapping[int, str]
+    """Names of classes by number, in small letters, as far as its makers state them."""
+    stated: NetSettings
+    """Settings that its makers state; a size stands for an input that takes any."""
 
     def run(
         self, values: Array, outputs: tuple[str, ...], seconds: float, grown: float = math.inf
@@ -124,20 +130,27 @@ class OnnxFile:
         """Return an error about the file."""
         return NetworkError(problem, where=self.path, remedy=remedy)
 
-    def question(self, problem: str, remedy: str = "", line: str = "") -> NetworkError:
+    def question(
+        self, problem: str, remedy: str = "", asked: str = "", settings: NetSettings | None = None
+    ) -> NetworkError:
         """Return an error that asks for a missing setting, and lists inputs and outputs.
 
-        ``line`` is one of a TOML file that might answer.
+        ``asked`` is a line of TOML with a question mark for what is missing; with all that is known
+        in ``settings`` it is the draft of a file.
         """
-        inputs = first_of([*map(str, self.inputs)], _SHOWN)
-        outputs = first_of([*map(str, self.outputs)], _SHOWN)
+        inputs = first_of([*map(str, self.inputs)], SHOWN)
+        outputs = first_of([*map(str, self.outputs)], SHOWN)
         listed = f" (inputs: {inputs}; outputs: {outputs})"
-        if line:
-            file = f"`file = {json.dumps(str(self.path))}` and `{line}`"
-            remedy = Sentence("{}, with lines such as {}", remedy, file)
-        if remedy:
-            return self.error(problem, Sentence("{}{}", remedy, listed))
-        return self.error(f"{problem}{listed}")
+        error = self.error(Sentence("{}{}", problem, listed), remedy)
+        if settings is not None:
+            name = f"{Path(settings.file).absolute().stem}.toml"
+            error.draft = f"# Save as {name}, put a value in place of ?, and give --net NAME={name}"
+            usual = asdict(NetSettings()) | {"sha256": settings.sha256}
+            for key, value in asdict(settings).items():
+                if value != usual[key]:
+                    error.draft += f"\n{key} = {json.dumps(value, ensure_ascii=False)}"
+            error.draft += f"\n{asked}"
+        return error
 
 
 def load(settings: NetSettings) -> OnnxFile:
@@ -148,14 +161,17 @@ def load(settings: NetSettings) -> OnnxFile:
     if not settings.file:
         remedy = "give the path of an ONNX file"
         raise NetworkError("names no network", setting="net.file", remedy=remedy)
-    path = Path(settings.file)
+    path, documents = Path(settings.file), None
     with reading(path, "cannot read the network"):
+        if path.is_dir():
+            documents = path, *makers.read_documents(path)
+            path = makers.find_network(path)
         check_input(path)
         status = path.stat()
     if status.st_size > LARGEST:
         raise NetworkError("larger than 2 GiB, which no ONNX file is", where=path)
     state = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
-    file = _open(path, settings.seconds, *state)
+    file = _open(path, settings.seconds, documents, *state)
     if settings.sha256 not in (None, file.sha256):
         other = "is another network than was asked for: {net.sha256} says {}, and its own is {}"
         raise file.error(Sentence(other, settings.sha256, file.sha256))
@@ -163,7 +179,9 @@ def load(settings: NetSettings) -> OnnxFile:
 
 
 @lru_cache(maxsize=4)
-def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
+def _open(
+    path: Path, seconds: float, documents: tuple[Path, bytes, bytes] | None, *_state: int
+) -> OnnxFile:
     import onnxruntime
 
     with reading(path, "cannot read the network"):
@@ -183,6 +201,13 @@ def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
             with (path.parent / inner).open("rb") as file:
                 while block := file.read(1 << 20):
                     digest.update(block)
+    if documents:
+        folder, config, preprocessor = documents
+        names, stated = (
+            makers.class_names(folder, config),
+            makers.input_settings(folder, preprocessor),
+        )
+        digest.update(config + preprocessor)
     # Some damaged files end the process that opens them, so another process opens them first.
     # With -P an onnxruntime.py beside the network is not imported.
     probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
@@ -205,17 +230,10 @@ def _open(path: Path, seconds: float, *_state: int) -> OnnxFile:
         inputs = tuple(map(Tensor.of, session.get_inputs()))
         outputs = tuple(map(Tensor.of, session.get_outputs()))
         metadata = session.get_modelmeta().custom_metadata_map
-    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata)
-
-
-@contextmanager
-def reading(path: Path, problem: str) -> Iterator[None]:
-    """Turn an error of reading into one line."""
-    try:
-        yield
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise NetworkError(f"{problem}: {reason}", where=path) from error
+    if not documents:
+        names, stated = makers.names_in(metadata), makers.settings_in(metadata)
+    names = {number: name.lower() for number, name in names.items()}
+    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata, names, stated)
 
 
 @contextmanager

@@ -25,15 +25,18 @@ class NetworkError(RoadevalError):
 class NetSettings:
     """Settings of a network. Missing values are read from the file, and listed in ``run.toml``.
 
-    file: The network, an ONNX file.
-    sha256: SHA-256 of the network's bytes, followed by those of its weight files, in hexadecimal:
-        any other file is an error.
+    file: The network: an ONNX file, or a folder of Hugging Face with ``model.onnx``,
+        ``config.json`` and ``preprocessor_config.json``.
+    sha256: SHA-256 of the network's bytes, followed by those of its weight files and of the JSON
+        files of its folder, in hexadecimal: any other file is an error.
     size: Width and height of the input in pixels. Default: those that the file states.
     resize: Way to resize an image to the input, with linear interpolation. ``stretch``, the
         default: each side by itself. ``letterbox``, the way of Ultralytics' networks: both sides by
         one factor until the image fits, in the middle of a grey area.
-    antialias: Whether a pixel of a reduced image is a mean of all pixels that it covers, as with
-        Pillow's bilinear filter.
+    stride: Number of pixels of which the sides of a letterbox are multiples, each as short as the
+        image allows: for a network that takes any size. Default: all letterboxes have ``size``.
+    antialias: Whether a pixel of a reduced image is a mean of all pixels that it covers, as by
+        Pillow's bilinear filter; ``bicubic`` takes that filter. Default: no, of Hugging Face yes.
     layout: Order of the input's dimensions: N images, C channels, H rows, W columns.
     channels: Order of the input's channels, by default ``rgb``. ``grey``: a single channel.
     scale: First factor of a grey level 0..255. Default: 1/255, or 1 if the network takes integers.
@@ -60,7 +63,8 @@ class NetSettings:
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
     size: tuple[Side, Side] | None = None
     resize: Literal["stretch", "letterbox"] | None = None
-    antialias: bool = False
+    stride: Side | None = None
+    antialias: bool | Literal["bicubic"] | None = None
     layout: Literal["NCHW", "NHWC"] | None = None
     channels: Literal["rgb", "bgr", "grey"] | None = None
     scale: Positive | None = None

@@ -15,6 +15,7 @@ from roadeval.cli import signals
 from roadeval.cli.app import THREADS, explain, main
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.signals import Stopped
+from roadeval.errors import RoadevalError
 
 
 def lines(capsys):
@@ -46,6 +47,14 @@ def test_an_error_of_the_system_is_a_known_problem(capsys):
     error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out.rrd")
     assert explain(error) == 1
     assert lines(capsys) == ["roadeval: error: No space left on device: out.rrd"]
+
+
+def test_the_draft_of_a_file_that_mends_an_error_stands_below_it(capsys):
+    error = RoadevalError("lacks a size")
+    error.draft = 'file = "n.onnx"\nsize = [?, ?]'
+    assert explain(error) == 1
+    asked = ["", 'file = "n.onnx"', "size = [?, ?]"]
+    assert lines(capsys) == ["roadeval: error: lacks a size", *asked]
 
 
 def test_a_defect_keeps_its_traceback_to_itself_but_says_how_to_see_it(capsys):

@@ -22,7 +22,7 @@ from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import DEMO, ROADEVAL, Replayed
 from tests.fixtures.drives import FRAMES, labels, scene, stamp
 from tests.fixtures.make import make
-from tests.networks.making import red_network
+from tests.networks.making import by_ultralytics, red_network
 from tests.results.fleet.making import fleet_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -84,6 +84,15 @@ def write_images(folder: Path) -> None:
             (folder / name / f"{number:04}.png").write_bytes(encoded(pixels))
 
 
+def write_segformer(folder: Path) -> None:
+    """Write a network as Hugging Face's tools export one."""
+    folder.mkdir()
+    red_network(folder / "model.onnx")
+    (folder / "config.json").write_text('{"id2label": {"0": "road"}}')
+    size = '{"do_normalize": false, "size": {"height": 24, "width": 32}}'
+    (folder / "preprocessor_config.json").write_text(size)
+
+
 def write_kitti(folder: Path) -> None:
     """Write two images of each category of KITTI's road benchmark, and a method's results."""
     training = folder / "kitti" / "training"
@@ -122,6 +131,8 @@ def world(tmp_path_factory) -> Path:
     write_coco(folder / "coco.json")
     write_drive(folder / "rig.mcap", cameras=("front", "left"), truth="labels")
     red_network(folder / "road.onnx")
+    by_ultralytics(red_network(folder / "yolo26n-sem.onnx"), {0: "road"}, imgsz=[24, 32])
+    write_segformer(folder / "segformer")
     reports = folder / "reports" / "drive"
     roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
     for name in ("old", "new"):

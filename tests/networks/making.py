@@ -74,6 +74,15 @@ def network(
     return path
 
 
+def by_ultralytics(path, names, **more):
+    """Give a network the metadata of one that Ultralytics has exported."""
+    model = onnx.load(path)
+    stated = {"author": "Ultralytics", "task": "semantic", "names": str(names), **more}
+    helper.set_model_props(model, {key: str(value) for key, value in stated.items()})
+    onnx.save(model, path)
+    return path
+
+
 def written(path: Path, nodes: list, values: dict | None = None, **opened) -> Path:
     """Write the network of some nodes, which make ``road`` of the image, a float of 0 to 1.
 

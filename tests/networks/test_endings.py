@@ -8,8 +8,8 @@ from onnx import TensorProto, helper
 from PIL import Image
 
 from roadeval.networks import NetSettings, Network, NetworkError
-from roadeval.networks.network import fit_image
-from tests.networks.making import IMAGE, ROAD, SIZE, network, written
+from roadeval.networks.network import fit_image, input_values
+from tests.networks.making import IMAGE, ROAD, SIZE, by_ultralytics, network, written
 
 pytestmark = pytest.mark.usefixtures("opened_here_alone")
 
@@ -151,14 +151,6 @@ def test_whole_numbers_that_are_quantised_probabilities_are_no_classes(tmp_path)
         Network.of(NetSettings(file=str(path), road=(1,)))
 
 
-def by_ultralytics(path, names, **more):
-    model = onnx.load(path)
-    made = {"author": "Ultralytics", "task": "semantic", "names": str(names)} | more
-    helper.set_model_props(model, made)
-    onnx.save(model, path)
-    return path
-
-
 @pytest.mark.parametrize("road", [None, (0,), (1,)])
 def test_of_a_single_class_ultralytics_writes_road_as_1(road, tmp_path):
     """``pred.gt(0)`` in ``SemanticSegmentationPredictor.postprocess``, and in its export."""
@@ -186,11 +178,22 @@ def test_class_maps_of_ultralytics_come_back_as_its_own_do(tmp_path):
 
 
 @pytest.mark.parametrize("size", [(37, 29), (16, 12), (9, 31), (80, 60)])
-def test_an_antialiased_image_is_pillows(size):
-    settings = NetSettings(file="n", size=size, resize="stretch", antialias=True)
+@pytest.mark.parametrize("antialias", [True, "bicubic"])
+def test_an_antialiased_image_is_pillows(antialias, size):
+    settings = NetSettings(file="n", size=size, resize="stretch", antialias=antialias)
     image = RNG.integers(0, 256, (47, 61, 3), np.uint8)
-    expected = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR))
-    assert np.abs(fit_image(image, settings).astype(int) - expected).max() <= 1
+    how = Image.Resampling.BILINEAR if antialias is True else Image.Resampling.BICUBIC
+    expected = np.asarray(Image.fromarray(image).resize(size, how))
+    assert np.array_equal(fit_image(image, settings), expected)
+
+
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+def test_levels_become_the_values_that_a_division_by_255_gives(dtype):
+    """As makers' code divides; half precision tells a product with 1/255 from it."""
+    settings = NetSettings(scale=1 / 255, mean=(0.0,), deviation=(1.0,), layout="NHWC")
+    levels = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
+    values = input_values(levels, settings, dtype)[0]
+    assert np.array_equal(values, levels.astype(dtype) / np.dtype(dtype).type(255))
 
 
 @pytest.mark.parametrize("sign", ["task", "boxes", "queries", "their lengths"])

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.config.run import RunConfig, run_toml
-from roadeval.data import FrameResult, Role
+from roadeval.data import TUNED, FrameResult, Role
 from roadeval.data.words import short_names
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.score.scoreboard import DriveSums
@@ -101,6 +101,10 @@ def replay(
     places_given = {name: str(path) for name, path in places.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": places_given}).resolved()
     config.check_focus(config.names())
+    for variant in config.variants():
+        if (about := variant.pipeline.about().get("net")) and not variant.name.endswith(TUNED):
+            note = f"{variant.name}: {about['reading']}"
+            on_progress(Progress(0, None, "opening", note))
     with open_log(open_source(drive, config.run.patience_s), config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)):
