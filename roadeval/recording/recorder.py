@@ -41,7 +41,6 @@ from roadeval.recording import rows as columns
 from roadeval.recording import views
 from roadeval.recording.codecs import Codec, codecs_of
 from roadeval.recording.layout import Layout, RecordingError, RecordRule
-from roadeval.recording.no_recording import NO_LINES, NO_TEXTS, Texts
 from roadeval.recording.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key, When
 from roadeval.recording.rrd_file import indexed_messages
 from roadeval.runtime.files import NewFile, partial_name, remove, writing
@@ -208,6 +207,10 @@ class WorstFrames:
 
 
 ALL: Final = RecordRule()
+Texts = Mapping[str, Mapping[str, str]]
+"""Results by their names, by camera."""
+NO_TEXTS: Final[Texts] = {}
+NO_LINES: Final[Mapping[str, str]] = {}
 UNWRITTEN: Final = 4 << 20
 """Most bytes that wait for Rerun's own thread to write them; Rerun itself has no limit."""
 

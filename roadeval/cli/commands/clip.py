@@ -24,7 +24,9 @@ def clip(
         Path, option("-o --output", "Folder, or the .mp4 or .gif of one clip.", "FOLDER|FILE")
     ] = Path("clips"),
     worst: Annotated[int | None, option("--worst", "Worst scenes. Default: 5.", "K", min=1)] = None,
-    frames: Annotated[range | None, option("--frames", "One clip, of these frames.", "A:B", parser=_span)] = None,
+    frames: Annotated[
+        range | None, option("--frames", "One clip, of these frames.", "A:B", parser=_span)
+    ] = None,
     focus: arguments.Focus = None,
     mcap: Annotated[bool, option("--mcap", "Also the log's own messages, as a log.")] = False,
     quiet: arguments.Quiet = False,

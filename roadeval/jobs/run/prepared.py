@@ -399,7 +399,7 @@ class ProcessedFrame:
 
 
 def process(
-    runs: Sequence[Run], encoder: Encoder, on_progress: OnProgress
+    runs: Sequence[Run], encoder: Encoder | None, on_progress: OnProgress
 ) -> Iterator[tuple[Run, ProcessedFrame]]:
     """Yield every decodable frame of the cameras by log time, and add it to its run's score.
 
@@ -448,7 +448,7 @@ def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
 
 
 def _process(
-    encoder: Encoder, item: tuple[Run, int, LoggedFrame]
+    encoder: Encoder | None, item: tuple[Run, int, LoggedFrame]
 ) -> tuple[Run, ProcessedFrame | Failure | None]:
     run, position, logged = item
     try:
@@ -481,7 +481,7 @@ def _process(
     disturbed, failures = _disturb(run, frame) if role is Role.EVALUATED else ({}, [])
     result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = csv_lines(run.key, frame_rows(result))
-    encoded = encoder.encode(result, position - 1)
+    encoded = encoder.encode(result, position - 1) if encoder else None
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
     return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)
 

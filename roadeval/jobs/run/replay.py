@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -19,9 +20,8 @@ from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
 from roadeval.logs.log import Log, open_log
-from roadeval.logs.writing.writer import NoSidecar, SidecarWriter
-from roadeval.recording.layout import Layout, RecordRule
-from roadeval.recording.no_recording import NullRecorder
+from roadeval.logs.writing.writer import SidecarWriter
+from roadeval.recording.layout import RecordRule
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
@@ -124,11 +124,9 @@ def _replay_log(
         prepare(log.for_camera(camera_config) if name else log, camera_config, on_progress, name)
         for name, camera_config in cameras.items()
     ]
-    layouts = {run.camera: run.layout() for run in runs}
-    rule = RecordRule.parse(config.output.record)
     with (
-        SidecarWriter(to.mcap) if to.mcap else NoSidecar() as sidecar,
-        _recorder_for(to.recording, layouts, rule) as recorder,
+        SidecarWriter(to.mcap) if to.mcap else nullcontext() as sidecar,
+        recorder_for(runs, to.recording, config) as recorder,
         ResultsWriter(to.reports) as results,
     ):
         drawn = _record_frames(
@@ -136,7 +134,8 @@ def _replay_log(
         )
         ended = [_sum_up(run, results, drawn[run.camera]) for run in runs]
         facts = _finish_recording(runs, ended, recorder, results, config)
-        sidecar.finish()
+        if sidecar:
+            sidecar.finish()
         tracebacks = tuple(text for run in runs for text in run.failures.tracebacks())
         del runs  # figures take the room of its frames and models
         trim()
@@ -187,32 +186,37 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
     return _CameraResult(facts, sums, _recorded_texts(run, facts, lines), tuple(run.board.metres()))
 
 
-def _recorder_for(
-    path: Path | None, layouts: Mapping[str, Layout], rule: RecordRule
-) -> Recorder | NullRecorder:
+def recorder_for(
+    runs: Sequence[Run], path: Path | None, config: RunConfig
+) -> AbstractContextManager[Recorder | None]:
+    """Return the recorder of some runs, or None without a path: then Rerun need not be there."""
     if path is None:
-        return NullRecorder()
+        return nullcontext()
     from roadeval.recording.recorder import Recorder
 
-    return Recorder(path, layouts, rule)
+    layouts = {run.camera: run.layout() for run in runs}
+    return Recorder(path, layouts, RecordRule.parse(config.output.record))
 
 
 def _finish_recording(
     runs: Sequence[Run],
     ended: Sequence[_CameraResult],
-    recorder: Recorder | NullRecorder,
+    recorder: Recorder | None,
     results: ResultsWriter,
     config: RunConfig,
 ) -> Facts:
     """Finish the recording; return the facts, of several cameras those of all together."""
     if len(runs) == 1:
-        recorder.finish(ended[0].texts)
+        if recorder:
+            recorder.finish(ended[0].texts)
         return ended[0].facts
     by_camera = {run.camera: end for run, end in zip(runs, ended, strict=True)}
     frames = concatenate([end.sums.frames for end in ended])
     disturbed = concatenate([end.sums.disturbed for end in ended])
     camera_facts = {name: end.facts for name, end in by_camera.items()}
     facts = summary.join_cameras(frames, disturbed, camera_facts, results.tables)
+    if recorder is None:
+        return facts
     # The seconds differ from run to run, see `_recorded_texts`.
     steady = {name: replace(facts, seconds={}) for name, facts in camera_facts.items()}
     recorded = replace(facts, run=deciding(config).as_dict(), cameras=steady)
@@ -224,9 +228,9 @@ def _finish_recording(
 
 def _record_frames(
     runs: Sequence[Run],
-    recorder: Recorder | NullRecorder,
+    recorder: Recorder | None,
     results: ResultsWriter,
-    sidecar: SidecarWriter | NoSidecar,
+    sidecar: SidecarWriter | None,
     *,
     on_progress: OnProgress,
     on_frame: OnFrame,
@@ -235,15 +239,18 @@ def _record_frames(
     examples = {run.camera: ExampleFrames(len(run.frames)) for run in runs}
     total = sum(len(run.frames) for run in runs)
     for position, (run, done) in enumerate(process(runs, recorder, on_progress), 1):
-        if forecast := recorder.forecast(done.encoded, total):
-            on_progress(Progress(position, total, "replaying", forecast))
-        recorder.write(done.encoded, done.lines)
+        if recorder:
+            if forecast := recorder.forecast(done.encoded, total):
+                on_progress(Progress(position, total, "replaying", forecast))
+            recorder.write(done.encoded, done.lines)
         results.append(done.lines)
-        sidecar.write(done.result, run.selection.image.frame_id, run.camera)
+        if sidecar:
+            sidecar.write(done.result, run.selection.image.frame_id, run.camera)
         examples[run.camera].offer(done.position, done.result)
         on_frame(done.result)
     on_progress(Progress(total, total, "writing"))
-    recorder.flush()
+    if recorder:
+        recorder.flush()
     trim()
     return {camera: camera_examples.kept for camera, camera_examples in examples.items()}
 

@@ -228,24 +228,6 @@ class SidecarWriter(LogWriter):
             self._write(topic, _metrics_schema(tuple(tally.rates)), stamp, log_time, data)
 
 
-class NoSidecar:
-    """Writes nothing, in a run without a sidecar."""
-
-    path: Final = None
-
-    def write(self, result: FrameResult, frame_id: str, camera: str = "") -> None:
-        """Write nothing."""
-
-    def finish(self) -> None:
-        """Write nothing."""
-
-    def __enter__(self) -> NoSidecar:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Close nothing."""
-
-
 @cache
 def _metrics_schema(rates: tuple[str, ...]) -> Schema:
     """Return the JSON Schema of the metrics, with Foxglove's form of a time."""
