@@ -67,7 +67,7 @@ def names_in(metadata: Mapping[str, str]) -> dict[int, str]:
     try:
         names = dict(ast.literal_eval(metadata.get("names", "{}")))
         return {int(number): str(name) for number, name in names.items()}
-    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+    except (ValueError, SyntaxError, TypeError, ArithmeticError, MemoryError, RecursionError):
         return {}
 
 

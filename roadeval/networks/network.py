@@ -258,8 +258,7 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
     table = np.broadcast_to(levels / np.array(settings.deviation), (256, image.shape[2]))
     if np.dtype(dtype).kind == "u":
         table = np.clip(np.rint(table), 0, 255)
-    values = np.take_along_axis(table.astype(dtype), image.reshape(-1, image.shape[2]), 0)
-    values = values.reshape(image.shape)
+    values = cv2.LUT(image, table.astype(dtype)[None]).reshape(image.shape)
     planes = values.transpose(2, 0, 1) if settings.layout == "NCHW" else values
     return np.ascontiguousarray(planes[None], dtype)
 

@@ -232,7 +232,7 @@ def _open(
         metadata = session.get_modelmeta().custom_metadata_map
     if not documents:
         names, stated = makers.names_in(metadata), makers.settings_in(metadata)
-    names = {number: name.lower() for number, name in names.items()}
+    names = {number: name.lower() for number, name in names.items() if number >= 0}
     return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata, names, stated)
 
 

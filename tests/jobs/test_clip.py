@@ -186,6 +186,14 @@ def test_the_messages_of_a_clip_replay_to_the_same_truth(recording, tmp_path):
     assert part[numbers].to_numpy().tolist() == before[numbers].to_numpy().tolist()
 
 
+def test_the_messages_of_a_clip_do_not_take_the_place_of_their_log(recording):
+    log = recording.with_suffix(".mcap")
+    content = log.read_bytes()
+    with pytest.raises(RoadevalError, match=r"drive.mcap: is an input or another output"):
+        roadeval.clip(recording, log.with_suffix(".mp4"), frames=range(2), mcap=True)
+    assert log.read_bytes() == content
+
+
 def test_of_a_damaged_log_the_readable_part_is_written(tmp_path, capsys):
     log = write_drive(tmp_path / "cut.mcap")
     content = log.read_bytes()

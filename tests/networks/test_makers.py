@@ -90,6 +90,12 @@ def test_a_network_of_ultralytics_for_another_task_is_refused(task, tmp_path):
     assert f"is for the task {task}" in str(refused(path))
 
 
+@pytest.mark.parametrize("names", ["{-1: 'road', 0: 'car'}", "{1e999: 'road', 0: 'car'}"])
+def test_names_with_impossible_numbers_are_no_classes(names, tmp_path):
+    path = by_ultralytics(network(tmp_path / "n.onnx", classes=3), names)
+    assert "tells 3 classes apart" in str(refused(path))
+
+
 # --- Hugging Face ---------------------------------------------------------------------------------
 
 

@@ -60,7 +60,8 @@ def clip(
     for drive, numbers, name in scenes:
         path = place if form else place / f"{name}.mp4"
         log = path.with_suffix(".mcap") if mcap else None
-        with holding(path, log, inputs=[result, drive.path]), writing(path, RoadevalError):
+        inputs = [result, drive.path, getattr(drive.facts.log, "path", None)]
+        with holding(path, log, inputs=inputs), writing(path, RoadevalError):
             losses += _write_log(drive, numbers, log) if log else ()
             rate, pictures = _film(drive, numbers, steps)
             put(path, encode(pictures, form or "mp4", rate, options))
