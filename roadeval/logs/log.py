@@ -32,6 +32,7 @@ from roadeval.logs.frames import (
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
+from roadeval.logs.topics.calibration import image_names
 from roadeval.logs.topics.choose import check_names, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.audits import without_corrections
@@ -377,13 +378,16 @@ class Log:
         images, times = self.readers[topic], self.readers[topic].log_times.tolist()
         end = min([times[last] + NS, *(time - 1 for time in times[last + 1 : last + 2])])
         span = times[first] - 2 * NS, end, images.stamp(last)
+        names = image_names(self.topics, self.readers)[sum(time < span[0] for time in times) :]
         messages = [
             (max(int(reader.log_times[position]), span[0]), reader, position)
             for about in self.topics
-            if (reader := self.readers[about.name])
+            if (reader := self.readers[about.name]) and about.kind is not TopicKind.NAMES
             for position in reader.span(about.kind, *span)
         ]
         with LogWriter(path) as excerpt:
+            if names:
+                excerpt.names(names, max(span[0], 0))
             for log_time, reader, position in sorted(messages, key=itemgetter(0)):
                 with suppress(FrameError):
                     _, channel, schema, _ = reader.carrier(position)

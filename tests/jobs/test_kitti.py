@@ -143,6 +143,17 @@ def test_a_folder_becomes_a_log_with_a_calibration_a_frame(kitti: Path, outcome:
     assert lens.mounting.translation[2] == pytest.approx(1.56, abs=0.01)
 
 
+def test_an_excerpt_keeps_the_names_of_its_images(kitti: Path, tmp_path: Path) -> None:
+    roadeval.pack(kitti / "training", tmp_path / "slow.mcap", rate_hz=0.4)
+    with open_log(tmp_path / "slow.mcap", every_topic=True) as log:
+        frames = [*log.frames(log.select())]
+        log.write_excerpt("/camera/image", 2, 3, tmp_path / "part.mcap")
+    with open_log(tmp_path / "part.mcap") as log:
+        part = [*log.frames(log.select())]
+    assert [frame.decode().name for frame in part] == [*NAMES][2:]
+    assert [frame.calibration for frame in part] == [frame.calibration for frame in frames[2:]]
+
+
 @pytest.mark.parametrize("name", ["masks", "levels"])
 @pytest.mark.parametrize("category", ["UM", "UMM", "UU", "URBAN"])
 def test_the_rates_are_those_of_the_kit(

@@ -98,10 +98,11 @@ class LogWriter:
         data = proto.SerializeToString(deterministic=True)
         self._write(topic, _schema_of(proto.__class__), stamp_ns, logged_ns, data)
 
-    def names(self, names: Sequence[str]) -> None:
+    def names(self, names: Sequence[str], stamp_ns: int = 0) -> None:
         """Write the names of all images, in their order: labels are found by them."""
         schema = "roadeval.ImageNames", "jsonschema", b'{"type": "object"}'
-        self._write("/camera/names", schema, 0, None, json.dumps({"names": [*names]}).encode())
+        data = json.dumps({"names": [*names]}).encode()
+        self._write("/camera/names", schema, stamp_ns, None, data)
 
     def mask(
         self,
