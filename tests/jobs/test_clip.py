@@ -173,6 +173,17 @@ def test_a_clip_that_fails_leaves_nothing(recording, tmp_path, monkeypatch):
     assert not [*tmp_path.iterdir()]
 
 
+def test_drives_of_a_fleet_with_one_name_have_clips_of_their_own(recording, tmp_path, monkeypatch):
+    both = [tmp_path / f"drive-{part}.rrd" for part in "ab"]
+    for copy in both:
+        copy.write_bytes(recording.read_bytes())
+    monkeypatch.setattr(job, "find_recordings", lambda _: both)
+    films, _ = roadeval.clip(tmp_path, tmp_path / "clips", frames=range(2))
+    names = [str(film.relative_to(tmp_path / "clips")) for film in films]
+    assert names == ["drive-a/drive-0000-0001.mp4", "drive-b/drive-0000-0001.mp4"]
+    assert all(film.exists() for film in films)
+
+
 # --- The log's own messages -----------------------------------------------------------------------
 
 

@@ -51,14 +51,17 @@ def clip(
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
     if not scenes or (form and len(scenes) > 1):
-        one, none = "a file holds one clip: name a folder", "no pictures of such frames were kept"
+        one = "a file holds one clip: name a folder"
+        none = "no pictures of such frames were kept; --record keeps some, and in a fleet --keep"
         raise RoadevalError(one if scenes else none, where=place if scenes else result)
     # With its matrix stated, no player guesses it from the size.
     options = {"crf": "20", "preset": "veryfast", "colorspace": "smpte170m"}
     total = sum(len(numbers) for _, numbers, _ in scenes)
     steps = map(on_progress, (Progress(done, total, "filming") for done in count(1)))
+    titles = [drive.title for drive in drives]
     for drive, numbers, name in scenes:
-        path = place if form else place / f"{name}.mp4"
+        part = drive.path.stem if titles.count(drive.title) > 1 else ""  # drives of one name
+        path = place if form else place / part / f"{name}.mp4"
         log = path.with_suffix(".mcap") if mcap else None
         inputs = [result, drive.path, getattr(drive.facts.log, "path", None)]
         with holding(path, log, inputs=inputs), writing(path, RoadevalError):
