@@ -134,9 +134,8 @@ def _fault_of_a_package(error: BaseException) -> str:
     """Return the sentence on an error of a package from outside, or one that is missing."""
     if isinstance(error, ModuleNotFoundError) and not f"{error.name}".startswith("roadeval"):
         return f"{error.name} is not installed: install roadeval with all that it depends on"
-    if package := discovery.failed_package(error):
-        return f"the package {package} failed: {discovery.one_line(error)}"
-    return ""
+    package = discovery.failed_package(error)
+    return f"the package {package} failed: {discovery.one_line(error)}" if package else ""
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:

@@ -230,8 +230,7 @@ class Disturbance(NamedTuple):
     @property
     def is_signed(self) -> bool:
         """Whether strengths below 0 mean something; a result may have kinds that are not here."""
-        kind = kinds().get(self.kind)
-        return kind is not None and kind.least < 0
+        return self.kind in kinds() and kinds()[self.kind].least < 0
 
     def __str__(self) -> str:
         sign = "+" if self.is_signed and self.strength > 0 else ""

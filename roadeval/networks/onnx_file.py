@@ -144,7 +144,7 @@ class OnnxFile:
         error = self.error(Sentence("{}{}", problem, listed), remedy)
         if settings is not None:
             name = f"{Path(settings.file).absolute().stem}.toml"
-            error.draft = f"# Save as {name}, put a value in place of ?, and give --net NAME={name}"
+            error.draft = f"# Save as {name} here, complete it, and give --net NAME={name}"
             usual = asdict(NetSettings()) | {"sha256": settings.sha256}
             for key, value in asdict(settings).items():
                 if value != usual[key]:

@@ -81,7 +81,7 @@ def correction(differences: Iterable[Difference]) -> str:
     if not any(map(is_significant, marked)):
         return ""
     if counts == [1]:
-        return f"{MARK} the interval does not contain 0."
+        return f"{MARK} ERR, with an interval that does not contain 0."
     return (
         f"{MARK} not chance, even though several are compared (Holm's correction); rows without it "
         "may be chance."

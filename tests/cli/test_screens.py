@@ -110,6 +110,14 @@ def test_the_second_line_of_what_to_type_next_fits_the_result(parts, step, tmp_p
     assert len(others) < 2
 
 
+def test_a_second_run_without_a_recording_leaves_the_results_of_the_first():
+    parts = {"totals": {"filtered": a_mask()}, "log": LogFacts("d.mcap", "0"), "labelled": 1}
+    verdict = "filtered: bad. Next: try --variant robust."
+    shown = screen(verdict=verdict, **parts)
+    command = "replay d.mcap --config reports/run.toml --variant robust --reports reports_robust"
+    assert f"roadeval {command}\n" in shown
+
+
 def test_the_figures_are_named_once_and_the_verdict_stands_last():
     files = tuple(Path("reports", name) for name in ("fig2_masks.png", "fig2_masks.pdf", "a.csv"))
     shown = screen(1, files=files, totals={"filtered": a_mask()}, verdict="filtered: fine.")

@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 from typing import Annotated
 
+import typer
+
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.arguments import option
 from roadeval.cli.commands.inspect import Results
@@ -40,6 +42,8 @@ def clip(
     beside them those of the best other variant. The messages begin 2 s earlier, and 'replay' opens
     them.
     """
+    if worst and frames:
+        raise typer.BadParameter("--worst and --frames do not go together")
     from roadeval.jobs.results.clip import clip as run
 
     with progress.show(quiet) as watch:

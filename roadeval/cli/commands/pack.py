@@ -10,7 +10,7 @@ from roadeval.cli.exit_codes import ExitCode
 
 
 def pack(
-    images: Annotated[Path, arguments.argument("IMAGES", "A folder of images, or a video file.")],
+    images: Annotated[Path, arguments.argument("IMAGES", "Images, a video, or kitti/training.")],
     output: Annotated[Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")],
     *,
     truth: Annotated[

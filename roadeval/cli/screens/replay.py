@@ -136,8 +136,9 @@ def _next_step(outcome: Outcome, place: Path) -> Iterator[str]:
         new, base = map(quote, masks)
         yield f"roadeval compare {path} --variant {base} --variant {new}"
     elif f"--variant {ROBUST}" in facts.verdict:
-        save = quote(f"{place.stem}_{ROBUST}.rrd")
-        yield f"roadeval replay {log} --config {config} --variant {ROBUST} --save {save}"
+        name = f"{place.stem}_{ROBUST}"
+        to = f"--save {quote(f'{name}.rrd')}" if outcome.recording else f"--reports {quote(name)}"
+        yield f"roadeval replay {log} --config {config} --variant {ROBUST} {to}"
 
 
 def megabytes(file: Path) -> str:

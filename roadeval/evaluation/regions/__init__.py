@@ -39,8 +39,7 @@ def of_frame(labelled: LabelledFrame) -> dict[str, Bits]:
     parts = [region.find(labelled) for region in regions()]
     by_name = {name: bits for part in parts for name, bits in part.items()}
     if len(by_name) < sum(map(len, parts)):
-        twice = next(name for name in by_name if sum(name in part for part in parts) > 1)
-        raise RoadevalError(f"two regions have the name {twice!r}", remedy="rename one of them")
+        raise RoadevalError("two regions have the same name", remedy="rename one of them")
     return by_name
 
 

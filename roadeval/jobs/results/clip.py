@@ -21,6 +21,7 @@ from roadeval.jobs.results.inspect import rank_frames
 from roadeval.jobs.results.pick import find_recordings
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.logs.log import open_log
+from roadeval.logs.writing.writer import VIDEO_SUFFIXES
 from roadeval.report.film import clip_picture, encode
 from roadeval.results.facts import focus_of
 from roadeval.results.verdict import lowest
@@ -47,6 +48,8 @@ def clip(
     """
     place, films, losses = Path(output), list[Path](), list[str]()
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
+    if form is None and place.suffix.lower() in VIDEO_SUFFIXES:
+        raise RoadevalError("a clip ends in .mp4 or .gif", where=place)
     results = [Result(path, focus=focus) for path in find_recordings(Path(result))]
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
