@@ -192,9 +192,8 @@ BUILT_IN: Final = (
 @cache
 def kinds() -> Mapping[str, DisturbanceKind]:
     """Return the kinds by their names, those of other packages last."""
-    others = installed(
-        "disturbances", DisturbanceKind, SettingError, [kind.name for kind in BUILT_IN]
-    )
+    names = [kind.name for kind in BUILT_IN]
+    others = installed("disturbances", DisturbanceKind, SettingError, names)
     return by_name((*BUILT_IN, *others))
 
 

@@ -258,7 +258,8 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
     table = np.broadcast_to(levels / np.array(settings.deviation), (256, image.shape[2]))
     if np.dtype(dtype).kind == "u":
         table = np.clip(np.rint(table), 0, 255)
-    values = cv2.LUT(image, table.astype(dtype)[None]).reshape(image.shape)
+    table = table.astype(dtype).astype(np.result_type(dtype, np.float32))  # LUT has no float16
+    values = cv2.LUT(image, table[None]).reshape(image.shape)
     planes = values.transpose(2, 0, 1) if settings.layout == "NCHW" else values
     return np.ascontiguousarray(planes[None], dtype)
 

@@ -10,13 +10,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
-from importlib.metadata import (
-    EntryPoint,
-    EntryPoints,
-    PackageNotFoundError,
-    entry_points,
-    version,
-)
+from importlib.metadata import EntryPoint, EntryPoints, PackageNotFoundError, entry_points, version
 from pkgutil import iter_modules
 from traceback import walk_tb
 from types import ModuleType
