@@ -1,4 +1,4 @@
-"""What a network's makers state of it: Ultralytics in its metadata, Hugging Face in JSON files."""
+"""The statements of a network's makers: metadata of Ultralytics, JSON files of Hugging Face."""
 
 from __future__ import annotations
 

@@ -131,12 +131,16 @@ class OnnxFile:
         return NetworkError(problem, where=self.path, remedy=remedy)
 
     def question(
-        self, problem: str, remedy: str = "", asked: str = "", settings: NetSettings | None = None
+        self,
+        problem: str,
+        remedy: str = "",
+        missing_line: str = "",
+        settings: NetSettings | None = None,
     ) -> NetworkError:
         """Return an error that asks for a missing setting, and lists inputs and outputs.
 
-        ``asked`` is a line of TOML with a question mark for what is missing; with all that is known
-        in ``settings`` it is the draft of a file.
+        ``missing_line`` is a line of TOML with a question mark for what is missing; with all that
+        ``settings`` have it is the draft of a file.
         """
         inputs = first_of([*map(str, self.inputs)], SHOWN)
         outputs = first_of([*map(str, self.outputs)], SHOWN)
@@ -149,7 +153,7 @@ class OnnxFile:
             for key, value in asdict(settings).items():
                 if value != usual[key]:
                     error.draft += f"\n{key} = {json.dumps(value, ensure_ascii=False)}"
-            error.draft += f"\n{asked}"
+            error.draft += f"\n{missing_line}"
         return error
 
 

@@ -12,6 +12,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, Final
 
 import numpy as np
@@ -114,7 +115,9 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
     return np.asarray(fitted.reshape(height, width, -1), np.uint8)
 
 
-def encode(pictures: Iterable[Plane], form: str, rate: Any, options: dict[str, str]) -> bytes:
+def encode(
+    pictures: Iterable[Plane], form: str, rate: Fraction | int, options: dict[str, str]
+) -> bytes:
     """Encode pictures with even sides, ``rate`` a second, as ``webm``, ``mp4`` or ``gif``."""
     import av
 

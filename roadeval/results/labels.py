@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data.words import counted, first_of, percent
-from roadeval.evaluation.score.label_errors import Reason
+from roadeval.evaluation.score.label_errors import LabelFlaw
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _REASONS: Final[Mapping[str, str]] = {
-    Reason.ANOTHER_FRAME: "it is the label of frame {}",
-    Reason.MIRRORED: "left and right are exchanged",
-    Reason.MOVED: "it lies {} of its place",
-    Reason.SPECKS: "specks or holes that nothing else has",
-    Reason.JUMP: "the labels before and after say {} in the same place",
-    Reason.METHODS: "methods that are right at this place in other frames see {}",
+    LabelFlaw.ANOTHER_FRAME: "it is the label of frame {}",
+    LabelFlaw.MIRRORED: "left and right are exchanged",
+    LabelFlaw.MOVED: "it lies {} of its place",
+    LabelFlaw.SPECKS: "specks or holes that nothing else has",
+    LabelFlaw.JUMP: "the labels before and after say {} in the same place",
+    LabelFlaw.METHODS: "methods that are right at this place in other frames see {}",
 }
 
 
@@ -28,7 +28,7 @@ def describe_suspect(suspect: Mapping[str, Any]) -> str:
     'it lies 12 px right and 4 px above of its place'
     """
     detail = str(suspect["detail"])
-    if suspect["reason"] == Reason.MOVED:
+    if suspect["reason"] == LabelFlaw.MOVED:
         ways = zip(map(int, detail.split(",")), ("right left", "below above"), strict=True)
         detail = " and ".join(f"{abs(by)} px {words.split()[by < 0]}" for by, words in ways if by)
     return _REASONS[suspect["reason"]].format(detail)

@@ -19,7 +19,7 @@ from typing import Any, Final, TypeVar
 from roadeval.runtime.text import visible
 
 KINDS: Final = ("disturbances", "label_formats", "metrics", "regions", "stages")
-"""What other packages may add."""
+"""The kinds of things that other packages may add."""
 Thing = TypeVar("Thing")
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from roadeval.evaluation.score.label_errors import (
+    LabelFlaw,
     LabelledView,
-    Reason,
     find_suspects,
     rank_suspects,
 )
@@ -40,7 +40,7 @@ def method_at(frame: int) -> np.ndarray:
     return mask
 
 
-def wrong_labels() -> dict[int, tuple[Reason, np.ndarray]]:
+def wrong_labels() -> dict[int, tuple[LabelFlaw, np.ndarray]]:
     """Labels that are wrong, and what the reason is."""
     cut, specks = road_at(7), road_at(17)
     cut[55:, 70:] = 0
@@ -48,11 +48,11 @@ def wrong_labels() -> dict[int, tuple[Reason, np.ndarray]]:
         cv2.circle(specks, (x, y), 2, 0, -1)
     moved = np.roll(road_at(21), 6, axis=0)
     return {
-        3: (Reason.MIRRORED, road_at(3)[:, ::-1]),
-        7: (Reason.JUMP, cut),
-        12: (Reason.ANOTHER_FRAME, road_at(2)),
-        17: (Reason.SPECKS, specks),
-        21: (Reason.MOVED, moved),
+        3: (LabelFlaw.MIRRORED, road_at(3)[:, ::-1]),
+        7: (LabelFlaw.JUMP, cut),
+        12: (LabelFlaw.ANOTHER_FRAME, road_at(2)),
+        17: (LabelFlaw.SPECKS, specks),
+        21: (LabelFlaw.MOVED, moved),
     }
 
 

@@ -52,7 +52,7 @@ _MUCH: Final = 10
 """Such a multiple where only methods say so, which may err themselves."""
 
 
-class Reason(StrEnum):
+class LabelFlaw(StrEnum):
     """Why a label looks wrong."""
 
     ANOTHER_FRAME = "another_frame"
@@ -69,7 +69,7 @@ class Suspect(NamedTuple):
     frame: int
     stamp_ns: int
     reason: str
-    """A `Reason`."""
+    """A `LabelFlaw`."""
     detail: str
     """The other frame's number, the move in pixels, or what an area is instead; else empty."""
     top: int
@@ -147,7 +147,7 @@ def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFra
     scores = np.zeros(max(labels, 1))
     scores[: len(suspects)] = suspects["score"]
     usual = _FLOOR + float(np.median(scores))
-    least = np.where(suspects["reason"] == Reason.METHODS, _MUCH, _CLEAR)
+    least = np.where(suspects["reason"] == LabelFlaw.METHODS, _MUCH, _CLEAR)
     suspects = suspects.assign(clear=suspects["score"] > least * usual)
     suspects = suspects[suspects["score"] > usual]
     ranked = np.lexsort((-suspects["score"], ~suspects["clear"]))
@@ -235,10 +235,10 @@ def _find_suspect(
     reason, detail = _explain(views, roads, place, wrong > 0)
     area = scores[areas] > 0
     if reason is None and scores[is_speck].sum() > 0.5 * scores.sum():
-        reason, area = Reason.SPECKS, area & is_speck[areas]
+        reason, area = LabelFlaw.SPECKS, area & is_speck[areas]
     elif reason is None:
         area = areas == scores.argmax()
-        reason = Reason.JUMP if jump[area].mean() > 0.5 else Reason.METHODS
+        reason = LabelFlaw.JUMP if jump[area].mean() > 0.5 else LabelFlaw.METHODS
         detail = "no road" if road[area].mean() > 0.5 else "road"
     left, top, width, height = np.multiply(cv2.boundingRect(np.uint8(area)), view.times).tolist()
     box, pixels = (top, left, top + height, left + width), int(area.sum()) * view.times**2
@@ -248,7 +248,7 @@ def _find_suspect(
 
 def _explain(
     views: Sequence[LabelledView], roads: Flags, place: int, wrong: Flags
-) -> tuple[Reason | None, str]:
+) -> tuple[LabelFlaw | None, str]:
     """Return which one mistake makes a label as it is; the number of the frame, or the move."""
     import cv2
 
@@ -259,13 +259,13 @@ def _explain(
     unlike = (roads[:, ::2, ::2] ^ road[::2, ::2]).mean(axis=(1, 2))
     unlike[place] = 1
     if unlike.min() < 0.1 * before:
-        return Reason.ANOTHER_FRAME, str(views[unlike.argmin()].frame)
+        return LabelFlaw.ANOTHER_FRAME, str(views[unlike.argmin()].frame)
     seen = view.ignored == 0
     if ((road[:, ::-1] ^ expected) & seen).mean() < 0.5 * before:
-        return Reason.MIRRORED, ""
+        return LabelFlaw.MIRRORED, ""
     inner = expected[_REACH:-_REACH, _REACH:-_REACH].astype(np.float32)
     misfits = cv2.matchTemplate(road.astype(np.float32), inner, cv2.TM_SQDIFF)
     down, right = (int(at) - _REACH for at in np.unravel_index(misfits.argmin(), misfits.shape))
     if max(abs(down), abs(right)) > 1 and misfits.min() < 0.5 * misfits[_REACH, _REACH]:
-        return Reason.MOVED, f"{right * view.times},{down * view.times}"
+        return LabelFlaw.MOVED, f"{right * view.times},{down * view.times}"
     return None, ""

@@ -207,6 +207,7 @@ def _read_transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Tran
 
 
 def _transforms_in(message: Any) -> Iterator[tuple[str, Transform]]:
+    """Yield the frame and the transform of each part of a message of ROS or Foxglove."""
     for frame in getattr(message, "transforms", [message]):
         moved = getattr(frame, "transform", frame)
         at = np.array([getattr(moved.translation, axis) for axis in "xyz"], float)
