@@ -52,6 +52,8 @@ def test_the_example_package_is_installed_and_used_by_its_entry_points(tmp_path)
     summary = json.loads((tmp_path / "reports" / "summary.json").read_text())
     final = summary["totals"]["mine"]["post"]
     assert final["pooled_caution"] == final["FP"] / (final["TP"] + final["FP"])
+    columns = pd.read_csv(tmp_path / "reports" / "frames.csv").columns
+    assert "caution" not in columns  # tables are the same with and without the package
     assert "fade-0_5" in summary["disturbances"]["mine"]
     assert summary["versions"]["smooth-road"] == "1.0"
     regions = pd.read_csv(tmp_path / "reports" / "regions.csv")
