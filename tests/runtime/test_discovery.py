@@ -8,6 +8,7 @@ from importlib.metadata import version
 import pytest
 
 from roadeval.errors import RoadevalError
+from roadeval.evaluation import regions
 from roadeval.evaluation.region import Region
 from roadeval.runtime import discovery
 
@@ -40,8 +41,8 @@ REGION = 'THING = Region({"left": "left"}, order=1, find=lambda frame: frame["le
 
 def test_an_entry_point_adds_one_thing_or_several(package):
     package("regions", REGION + "\nALL = [THING, THING]", "things:ALL")
-    regions = discovery.installed("regions", Region, RoadevalError)
-    assert [region.titles for region in regions] == [{"left": "left"}] * 2
+    added = discovery.installed("regions", Region, RoadevalError)
+    assert [region.titles for region in added] == [{"left": "left"}] * 2
     assert discovery.installed("metrics", Region, RoadevalError) == []
     assert (
         discovery.versions_of_additions()
@@ -74,3 +75,12 @@ def test_an_error_in_a_package_is_its_own(package):
     with pytest.raises(ImportError) as caught:
         import_module("nowhere")
     assert discovery.failed_package(caught.value) == ""
+
+
+def test_two_regions_of_one_name_are_an_error(monkeypatch):
+    left = Region({"left": "left"}, order=1, find=lambda _: {"left": 1})
+    monkeypatch.setattr(regions, "regions", lambda: (left,))
+    assert regions.of_frame(None) == {"left": 1}
+    monkeypatch.setattr(regions, "regions", lambda: (left, left))
+    with pytest.raises(RoadevalError, match="two regions have the same name"):
+        regions.of_frame(None)
