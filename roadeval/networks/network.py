@@ -291,8 +291,8 @@ def complete_settings(settings: NetSettings, file: OnnxFile) -> NetSettings:
     names = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(names) > 1:
         name_them = Sentence("name those that show road by {net.outputs}")
-        missing_line = f"outputs = [?]  # some of {', '.join(map(json.dumps, names[:SHOWN]))}"
-        raise file.question("gives several outputs", name_them, missing_line, settings)
+        line = f"outputs = [?]  # some of {', '.join(map(json.dumps, names[:SHOWN]))}"
+        raise file.question("gives several outputs", name_them, line, settings)
     outputs = settings.outputs or names
     if unknown := [name for name in outputs if name not in names]:
         see = Sentence("see {net.outputs}")
@@ -459,8 +459,8 @@ def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     size = settings.size or ((columns, rows) if columns and rows else file.stated.size)
     if size is None:
         give = Sentence("give width and height by {net.size}")
-        missing_line = "size = [?, ?]  # width and height, such as [512, 256]"
-        raise file.question("takes images of any size", give, missing_line, settings)
+        line = "size = [?, ?]  # width and height, such as [512, 256]"
+        raise file.question("takes images of any size", give, line, settings)
     width, height = size
     if columns not in (None, width) or rows not in (None, height):
         see = Sentence("see {net.size}")

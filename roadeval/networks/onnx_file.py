@@ -131,15 +131,11 @@ class OnnxFile:
         return NetworkError(problem, where=self.path, remedy=remedy)
 
     def question(
-        self,
-        problem: str,
-        remedy: str = "",
-        missing_line: str = "",
-        settings: NetSettings | None = None,
+        self, problem: str, remedy: str = "", line: str = "", settings: NetSettings | None = None
     ) -> NetworkError:
         """Return an error that asks for a missing setting, and lists inputs and outputs.
 
-        ``missing_line`` is a line of TOML with a question mark for what is missing; with all that
+        ``line`` is a line of TOML with a question mark for what is missing; with all that
         ``settings`` have it is the draft of a file.
         """
         inputs = first_of([*map(str, self.inputs)], SHOWN)
@@ -153,7 +149,7 @@ class OnnxFile:
             for key, value in asdict(settings).items():
                 if value != usual[key]:
                     error.draft += f"\n{key} = {json.dumps(value, ensure_ascii=False)}"
-            error.draft += f"\n{missing_line}"
+            error.draft += f"\n{line}"
         return error
 
 

@@ -99,7 +99,7 @@ def make_film(
     # One quality, and less if it would not have room.
     options = {"crf": "36", "deadline": "realtime", "cpu-used": "8", "row-mt": "0"}
     options["b"] = str(int(8 * room * FPS / len(frames)))
-    content = encode(map(mosaic, frames), "webm", FPS, options)
+    content = encode(map(mosaic, frames), "webm", Fraction(FPS), options)
     return Film(content, frames, panels, columns, width, height)
 
 
@@ -115,9 +115,7 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
     return np.asarray(fitted.reshape(height, width, -1), np.uint8)
 
 
-def encode(
-    pictures: Iterable[Plane], form: str, rate: Fraction | int, options: dict[str, str]
-) -> bytes:
+def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[str, str]) -> bytes:
     """Encode pictures with even sides, ``rate`` a second, as ``webm``, ``mp4`` or ``gif``."""
     import av
 
