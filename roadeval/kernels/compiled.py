@@ -17,20 +17,18 @@ import numpy.typing as npt
 
 from roadeval.data.arrays import (
     Bits,
-    CodeTable,
     Costs,
     Distances,
+    Floats,
     Image,
     Indices,
     Masks,
-    Matrix,
     Plane,
     Planes,
     Reach,
     Runs,
     Sums,
     Values,
-    Vector,
     Words,
 )
 from roadeval.kernels import _loops, plain
@@ -57,7 +55,7 @@ def _require(array: npt.NDArray[Any], *shape: int) -> None:
         raise ValueError(f"an array of shape {array.shape}, not {shape}")
 
 
-def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
+def look_up_sum_min(planes: Planes, table: Plane) -> tuple[Plane, Sums]:
     _require(table, 766, 256)
     height, width = _shape(*planes)
     codes, histogram = np.empty((height, width), np.uint8), np.empty(256, np.int64)
@@ -67,7 +65,7 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
 
 
 def mahalanobis(
-    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
+    planes: Planes, mean: Floats, whitening: Floats, greatest: float
 ) -> tuple[Values, Plane]:
     _require(mean, 3)
     _require(whitening, 3, 3)
@@ -106,7 +104,7 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
     return sums
 
 
-def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
+def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)

@@ -13,14 +13,13 @@ import numpy as np
 from roadeval.data import pack, unpack
 from roadeval.data.arrays import (
     Bits,
-    CodeTable,
     Costs,
     Distances,
+    Floats,
     Image,
     Indices,
     Labels,
     Masks,
-    Matrix,
     Places,
     Plane,
     Planes,
@@ -28,7 +27,6 @@ from roadeval.data.arrays import (
     Runs,
     Sums,
     Values,
-    Vector,
     Words,
 )
 
@@ -48,7 +46,7 @@ LEAVES: Final = 32
 # --- Colours of pixels: looked up in tables, and their distance from a mean (Eq. 2) ---------------
 
 
-def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
+def look_up_sum_min(planes: Planes, table: Plane) -> tuple[Plane, Sums]:
     """Look every pixel up by the sum and the minimum of its channels.
 
     ``planes`` are red, green and blue, ``(H, W)`` uint8 each; ``table`` is ``(766, 256)`` uint8,
@@ -60,7 +58,7 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
 
 
 def mahalanobis(
-    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
+    planes: Planes, mean: Floats, whitening: Floats, greatest: float
 ) -> tuple[Values, Plane]:
     """Compute the distance of Eq. 2, ``|W (x - m)|``, of every pixel.
 
@@ -182,7 +180,7 @@ def _sums(labels: Places, colours: Plane, count: int) -> Sums:
     return np.stack(sums, axis=1).astype(np.int64)
 
 
-def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
+def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
     """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
 
     ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` are

@@ -134,7 +134,7 @@ class ImageCodec(Codec):
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
-        return _restore(super().decode(payload), self.width, self.height)
+        return np.asarray(cv2.resize(super().decode(payload), (self.width, self.height)))
 
 
 class MaskCodec(Codec):
@@ -229,7 +229,7 @@ class ScalarCodec(Codec):
         codes = to_labels(payload, limits_for(self.width, self.height))
         low, high = self.spec.value_range
         values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
-        return _restore(values, self.width, self.height)
+        return np.asarray(cv2.resize(values, (self.width, self.height)))
 
 
 def _reduce(array: Array) -> Array:
@@ -238,13 +238,6 @@ def _reduce(array: Array) -> Array:
     size = -(-width // block), -(-height // block)
     small: Array = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
     return small
-
-
-def _restore(array: Array, width: int, height: int) -> Array:
-    if array.shape[:2] == (height, width):
-        return array
-    full: Array = cv2.resize(array, (width, height))
-    return full
 
 
 def _jpeg(rgb: Array) -> bytes:

@@ -256,10 +256,8 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
                 )
             indexed_stores = _read_index(file)
             stores = _scan(file) if indexed_stores is None else indexed_stores
-            recordings, made_by = (
-                defaultdict[bytes, list[StoredMessage]](list),
-                "an unknown program",
-            )
+            recordings = defaultdict[bytes, list[StoredMessage]](list)
+            made_by = "an unknown program"
             for store, messages in stores:
                 fields = dict(protobuf_fields(store))
                 application = bytes(dict(protobuf_fields(fields[3]))[1]).decode()

@@ -117,18 +117,15 @@ def write_figures(
 
     def write(named_svg: tuple[str, bytes]) -> list[Path]:
         name, svg = named_svg
-        files = {folder / f"{name}.{kind}": _content(svg, kind) for kind in kinds}
-        for path, content in files.items():
-            write_file(path, content)
-        return list(files)
+        files = {kind: folder / f"{name}.{kind}" for kind in kinds}
+        for kind, path in files.items():
+            dpi = DPI if kind == "png" else None
+            write_file(path, svg if kind == "svg" else typeset_figure(svg, kind, dpi))
+        return list(files.values())
 
     # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
     # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.
     return [path for paths in map_ordered(write, draw(), 1) for path in paths]
-
-
-def _content(svg: bytes, kind: FileKind) -> bytes:
-    return svg if kind == "svg" else typeset_figure(svg, kind, DPI if kind == "png" else None)
 
 
 def as_svg(figure: Figure) -> bytes:

@@ -26,7 +26,6 @@ from roadeval.data import (
     histogram,
 )
 from roadeval.data.arrays import Bits, Values
-from roadeval.data.result import Cells
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
@@ -203,25 +202,18 @@ class BlindPrior:
         """
         if not truths:
             raise ValueError("a prior needs at least one truth")
+        import cv2
+
         road = np.zeros(truths[0].shape, np.float32)
         labelled = np.zeros_like(road)
         for truth in truths:
-            resized = _resize(truth, road.shape, mixed=False)
+            resized = cv2.resize(truth, road.shape[::-1], interpolation=cv2.INTER_NEAREST)
             road += resized == ROAD
             labelled += resized != IGNORE
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
         """Return the mask for a frame of ``shape`` (height, width): road from one half."""
-        return Packed.of(_resize(self.road, shape, mixed=True) >= 0.5)
+        import cv2
 
-
-def _resize(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
-    """Return an image in another size; the nearest pixels if values may not be ``mixed``."""
-    if image.shape == shape:
-        return image
-    import cv2
-
-    how = cv2.INTER_LINEAR if mixed else cv2.INTER_NEAREST
-    resized: Cells = cv2.resize(image, (shape[1], shape[0]), interpolation=how)
-    return resized
+        return Packed.of(cv2.resize(self.road, shape[::-1]) >= 0.5)

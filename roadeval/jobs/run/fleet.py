@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError, Executor, Future, as_completed
+from concurrent.futures import CancelledError, Executor, as_completed
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -213,26 +213,23 @@ class FleetRun:
         ]
         self.show("training")
         futures = [engine.submit(train_fold, task) for task in training]
-        made = [self._model(future, fold) for fold, future in enumerate(futures)]
-        tasks = []
+        made, tasks = [], []
+        for fold, future in enumerate(futures):
+            try:
+                made.append(future.result())
+            except Exception as error:  # it fails the fold's drives alone
+                problem = self._reason(error, f"the model of fold {fold} was trained")
+                made.append(FoldModel(fold, "", problem))
         for entry in self.entries:
-            fold = made[folds[entry.id]]
-            config = configs[entry.id].override(
-                {"training": {"model": str(training[fold.fold].path)}}
-            )
-            task = self._task(entry, config, fold.sha256, fold.fold)
-            if fold.problem:
-                self._fail(task, fold.problem)
+            model = made[folds[entry.id]]
+            path = str(training[model.fold].path)
+            config = configs[entry.id].override({"training": {"model": path}})
+            task = self._task(entry, config, model.sha256, model.fold)
+            if model.problem:
+                self._fail(task, model.problem)
             else:
                 tasks.append(task)
         return tasks
-
-    def _model(self, future: Future[FoldModel], fold: int) -> FoldModel:
-        """Wait for the model of a fold; one that fails fails its drives alone."""
-        try:
-            return future.result()
-        except Exception as error:
-            return FoldModel(fold, "", self._reason(error, f"the model of fold {fold} was trained"))
 
     def _replay(self, tasks: Sequence[DriveTask]) -> None:
         """Replay the tasks' drives, and take each result as it comes."""

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
@@ -50,6 +50,9 @@ from roadeval.training.learning import Schedule
 from roadeval.training.model import Model, ModelError
 from roadeval.training.settings import TrainingSettings
 from roadeval.version import VERSION
+
+if TYPE_CHECKING:
+    from roadeval.recording.recorder import Recorder
 
 KEPT: Final = 5
 """Tracebacks that are kept, those of the first errors that say different things; and the frames
@@ -376,13 +379,6 @@ def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-class Encoder(Protocol):
-    """The part of a recorder that encodes a frame; called from any thread."""
-
-    def encode(self, result: FrameResult, position: int) -> Any:
-        """Encode the frame at ``position`` among those read, from 0."""
-
-
 @dataclass(frozen=True, eq=False)
 class ProcessedFrame:
     """A scored frame without its layers, its lines of the tables, and its encoded form.
@@ -399,7 +395,7 @@ class ProcessedFrame:
 
 
 def process(
-    runs: Sequence[Run], encoder: Encoder | None, on_progress: OnProgress
+    runs: Sequence[Run], recorder: Recorder | None, on_progress: OnProgress
 ) -> Iterator[tuple[Run, ProcessedFrame]]:
     """Yield every decodable frame of the cameras by log time, and add it to its run's score.
 
@@ -415,7 +411,7 @@ def process(
             yield runs[place], read[place], logged
 
     workers = runs[0].config.run.jobs or os.cpu_count() or 1
-    work = partial(_process, encoder)
+    work = partial(_process, recorder)
     for position, (run, done) in enumerate(map_ordered(work, numbered(), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
@@ -448,7 +444,7 @@ def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
 
 
 def _process(
-    encoder: Encoder | None, item: tuple[Run, int, LoggedFrame]
+    recorder: Recorder | None, item: tuple[Run, int, LoggedFrame]
 ) -> tuple[Run, ProcessedFrame | Failure | None]:
     run, position, logged = item
     try:
@@ -481,7 +477,7 @@ def _process(
     disturbed, failures = _disturb(run, frame) if role is Role.EVALUATED else ({}, [])
     result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = csv_lines(run.key, frame_rows(result))
-    encoded = encoder.encode(result, position - 1) if encoder else None
+    encoded = recorder.encode(result, position - 1) if recorder else None
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
     return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)
 

@@ -70,7 +70,7 @@ def make_facts(
         **parts,
         effects=[*effects],
         verdict="",
-        misfits=[*_misfit_sentences(run)],
+        misfits=[misfit_sentence(f, run.selection, run.config) for f in run.fit.findings()],
         unlabelled=_unlabelled_facts(run.board.unlabelled),
         estimate=_estimate_rates(run, sums.frames),
         thresholds=dict(_best_thresholds(run)),
@@ -95,7 +95,7 @@ def make_facts(
             settings.adapt,
         ),
         warnings=list(warnings(run, parts["totals"])),
-        losses=list(losses(run)),
+        losses=[*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences()],
         run=run.config.as_dict(),
         settings={variant.name: variant.pipeline.as_dict() for variant in run.variants},
         methods=run.methods,
@@ -144,12 +144,6 @@ def _why_not_random(run: Run, picks: Picks) -> str:
     if seen.in_range < seen.in_log or (seen.read < seen.in_range and not labelled):
         return "only a part of the drive was read"
     return ""
-
-
-def _misfit_sentences(run: Run) -> Iterator[str]:
-    """Yield what of truth and masks does not fit the images, and what to do about it."""
-    for finding in run.fit.findings():
-        yield misfit_sentence(finding, run.selection, run.config)
 
 
 def misfits_of_truth(log: Log) -> Iterator[str]:
@@ -417,11 +411,6 @@ def _label_warnings(run: Run) -> Iterator[str]:
             "frames that have",
             why if stride > 1 else "",
         )
-
-
-def losses(run: Run) -> tuple[str, ...]:
-    """List the parts of the log that were lost, and the frames on which a stage failed."""
-    return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
 
 
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:

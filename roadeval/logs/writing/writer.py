@@ -39,7 +39,7 @@ from roadeval.logs.files import (
 from roadeval.logs.messages.pictures import turn_of
 from roadeval.logs.settings import NS
 from roadeval.logs.writing import kitti
-from roadeval.runtime.files import NewFile, check_input, writing
+from roadeval.runtime.files import NewFile, check_input, reading, writing
 from roadeval.version import VERSION
 
 FRAME_ID: Final = "camera"
@@ -205,9 +205,8 @@ class SidecarWriter(LogWriter):
             palette = np.zeros((256, 4), np.uint8)
             for label in errors.spec.classes:
                 palette[label.value] = label.rgba
-            images[f"{root}/{name}/{errors.spec.name}"] = palette[
-                np.asarray(errors.array, np.uint8)
-            ]
+            codes = np.asarray(errors.array, np.uint8)
+            images[f"{root}/{name}/{errors.spec.name}"] = palette[codes]
         for topic, image in images.items():
             self.mask(topic, stamp, image, log_time_ns=log_time, frame_id=frame_id or FRAME_ID)
         for tally in result.tallies:
@@ -393,23 +392,20 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
 def _image(file: Path, *, is_label: bool = False, of_kitti: bool = False) -> tuple[bytes, str]:
     """Read a JPEG or PNG file with any ending; a label must not be a JPEG."""
     try:
-        check_input(file)
-        data = file.read_bytes()
+        with reading(file, LogError):
+            check_input(file)
+            data = file.read_bytes()
         size_of(data, Limits())
         format_ = format_of(data)
         assert format_ is not None
         if is_label and not format_.exact:
-            raise LogError(
-                f"{format_.name} changes label values", where=file, remedy="masks must be lossless"
-            )
+            problem, remedy = f"{format_.name} changes label values", "masks must be lossless"
+            raise LogError(problem, where=file, remedy=remedy)
         if format_.media_type is None:
-            raise LogError(
-                f"{format_.name}, which not all viewers know: save it as PNG", where=file
-            )
+            problem = f"{format_.name}, which not all viewers know: save it as PNG"
+            raise LogError(problem, where=file)
         if of_kitti:
             return png_of(kitti.road_mask(data)), "png"
         return data, format_.media_type.removeprefix("image/")
-    except OSError as error:
-        raise LogError(str(error.strerror), where=file) from error
     except ImageError as error:
         raise LogError.of(error, file) from error
