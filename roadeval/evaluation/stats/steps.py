@@ -59,15 +59,14 @@ def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
         end, noise = _alarm(level, width, _noises(jumps, odds)[runs], odds * 8 / 3)
         if not end:
             break
-        place, drifts = _change(level[: end + 1], noise)
+        rise = level[end] - level[0]
+        goes_on = any(last.after == runs[0] and last.change * rise > 0 for last in steps[-1:])
+        place, drifts = _change(level[: end + 1], noise, -2 if goes_on else 2)
         seen, start = int(runs[end]), end if drifts else place
         change = float(np.median(level[start : end + 1]) - np.median(level[:place]))
         rest = level[end + 1 : end + 2] - level[end]
         back = place == end and bool((np.abs(rest + change) < np.abs(rest)).any())
-        goes_on = (
-            steps and not back and steps[-1].after == runs[0] and steps[-1].change * change > 0
-        )
-        if goes_on and (place == 1 or (drifts and 3 * place <= end)):
+        if goes_on and not back and (place == 1 or (drifts and 2 * place <= end)):
             steps[-1] = steps[-1]._replace(kind="drift", after=int(runs[start]))
         else:
             kind = "outlier" if back else "drift" if drifts else "step"
@@ -142,11 +141,10 @@ def _fit(level: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
     return losses, least, np.append(0, least[1:] + gains.max(axis=1))
 
 
-def _change(level: Floats, noise: Floats) -> tuple[int, bool]:
-    """Return the place at which the level changes, and whether it drifts from there on.
+def _change(level: Floats, noise: Floats, margin: float) -> tuple[int, bool]:
+    """Return the place at which the level changes, and whether a rise fits better from there on.
 
-    Two levels and a rise, over the last 3 runs or more, have three parameters each. Least squares
-    fit the rise; runs that are far from both levels have less weight.
+    Least squares fit the rise of 3 or more runs; runs far from both levels have less weight.
     """
     losses, least, gains = _fit(level, noise)
     place = int((losses[:-1] - least[:-1, None] - losses[-1]).max(axis=1).argmax()) + 1
@@ -157,5 +155,5 @@ def _change(level: Floats, noise: Floats) -> tuple[int, bool]:
     slope = (rises * weight) @ level / (rises**2 @ weight)
     off = level - weight @ level / weight.sum() - slope[:, None] * rises
     lost = 4 * np.log1p((off / noise) ** 2 / 3).sum(axis=1)
-    drifts = bool(lost.min(initial=math.inf) + 2 < least[-1] - gains[-1])
+    drifts = bool(lost.min(initial=math.inf) + margin < least[-1] - gains[-1])
     return (int(lost.argmin()) + 1 if drifts else place), drifts
