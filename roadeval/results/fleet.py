@@ -68,7 +68,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUN: Final = "run.toml"
-FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in OF_DRIVES))
+WRITTEN: Final = (*OF_DRIVES, "classes")
+"""The tables of all drives in one file; older fleets have no ``classes``."""
+FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
 """The files of a fleet's folder; beside them lie folders with the files of its drives."""
 RESULTS: Final = "results"
 PICTURES: Final = "pictures"
@@ -189,12 +191,17 @@ class FleetFolder:
         `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
         of final masks.
         """
-        if name in OF_DRIVES:
+        if name in OF_DRIVES or (self.has_classes and name == "classes"):
             rows = read_parquet([self.path / f"{name}.parquet"], name)
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
         return table_of_drives(self.path, name, chosen)
+
+    @property
+    def has_classes(self) -> bool:
+        """Whether ``classes`` of all drives is one file."""
+        return (self.path / "classes.parquet").is_file()
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -430,7 +437,8 @@ class FleetWriter:
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
         made["worst"] = rank_worst(made["worst"])
-        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in OF_DRIVES})
+        made["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
+        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in WRITTEN})
         finals = {
             "drives": made["drives"],
             "scores": only(made["scores"], final=True, region=ALL),

@@ -16,11 +16,13 @@ from roadeval.evaluation.comparison.conditions import Condition, Judgement, judg
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
+from roadeval.jobs.results.history import last_good
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
-from roadeval.report.pdf.typeset import typeset, write_file
-from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
+from roadeval.report.pdf.typeset import write_file
+from roadeval.report.writing import write_document
+from roadeval.results.comparison import as_dict, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
 from roadeval.runtime.files import Paths, list_paths
@@ -50,33 +52,20 @@ class Compared:
         """The content of the JSON file."""
         return as_dict(self.comparison, self.judgements)
 
-    @property
-    def held(self) -> list[str]:
-        """The sentences of the conditions that hold."""
-        return [describe_judgement(judgement) for judgement in self.judgements if judgement.holds]
-
-    @property
-    def unjudged(self) -> list[str]:
-        """Why conditions could not be judged."""
-        return [
-            describe_judgement(judgement)
-            for judgement in self.judgements
-            if judgement.holds is None
-        ]
-
 
 def compare(
     results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 
-    A `RoadevalError` if a result cannot be read, or there is nothing to compare. Why a condition
-    cannot be judged is in `Compared.unjudged`.
+    A `RoadevalError` if a result cannot be read, or there is nothing to compare. A
+    condition that cannot be judged has a judgement that says why.
 
     Parameters
     ----------
     results
         Recordings, results folders or fleets' folders. Of a single one the variants are compared.
+        The base may be a folder of many runs: their last good one, see `roadeval.history`.
     variants
         Of several results: only these, where ``a=b`` holds the base's ``a`` against the others'
         ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
@@ -89,6 +78,7 @@ def compare(
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
+    paths[:1] = paths[:1] if across else [last_good(paths[0], paths[1:])]
     opened = [Result(path) for path in paths]
     if across:
         opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
@@ -165,20 +155,13 @@ def write(compared: Compared, path: Path) -> Path:
 
     A `RoadevalError` if the ending is another, or the file cannot be written.
     """
-    match path.suffix.lower():
-        case ".pdf":
-            content = typeset(_document(compared))
-        case ".html":
-            content = as_page(compared)
-        case ".md":
-            from roadeval.report.comparison import markdown
+    from roadeval.report.comparison import markdown
 
-            content = markdown(compared.comparison, compared.judgements).encode()
-        case ".json":
-            content = as_json(compared).encode()
-        case _:
-            raise RoadevalError(f"{path}: a comparison is written as .pdf, .html, .md, .json")
-    return write_file(path, content)
+    return write_document(
+        *(path, "a comparison", lambda: _document(compared)),
+        lambda: markdown(compared.comparison, compared.judgements),
+        lambda: as_json(compared),
+    )
 
 
 def as_page(compared: Compared) -> bytes:
