@@ -36,6 +36,7 @@ from roadeval.results.facts import (
     FactsFile,
     FleetFacts,
     Member,
+    Origin,
     check_format,
     is_fleet,
 )
@@ -184,15 +185,20 @@ class FleetFolder:
         """The folder's name."""
         return self.path.resolve().name
 
-    def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
-        """Read a table of all drives, or of some of them.
+    def table(
+        self,
+        name: str,
+        drives: Collection[str] | None = None,
+        columns: Collection[str] | None = None,
+    ) -> pd.DataFrame:
+        """Read a table of all drives, or of some of them, of a file all columns or some.
 
         The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and those of
         `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
         of final masks.
         """
         if name in OF_DRIVES or (self.has_classes and name == "classes"):
-            rows = read_parquet([self.path / f"{name}.parquet"], name)
+            rows = read_parquet([self.path / f"{name}.parquet"], name, columns)
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
@@ -394,6 +400,7 @@ class FleetWriter:
         run_toml: str,
         *,
         asked: Mapping[str, str] | None = None,
+        origin: Origin | None = None,
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
@@ -410,6 +417,7 @@ class FleetWriter:
             read = partial(table_of_drives, self.folder)
             given = finals, members, settings, dict(run), within
             facts = summarise(*given, disturbances=disturbed, read=read)
+            facts = replace(facts, origin=origin)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts

@@ -39,7 +39,7 @@ from roadeval.report.writing import write_document
 from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
 from roadeval.results.history import Event, History, RunFacts, as_dict, group_changes
 from roadeval.results.schema import TAG
-from roadeval.results.tables import count_rows, read_parquet, read_table
+from roadeval.results.tables import read_parquet, read_table
 from roadeval.runtime.files import Paths, list_paths
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ DRIVES: Final = 3
 """Frames that are named of an event, and drives in which they are searched."""
 NEAR: Final = 10
 """Runs on both sides of a step whose frames are compared, if there is one drive."""
-BATCH: Final = 100
+BATCH: Final = 50
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "scores": (
@@ -186,7 +186,7 @@ def _runs_in_order(
 
 def _origin(result: Result, path: Path) -> Origin:
     """Return how a result was made; its time is that of its file if it does not say."""
-    origin = getattr(result.facts, "origin", None) or Origin()
+    origin = result.facts.origin or Origin()
     if origin.made_ns is not None:
         return origin
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
@@ -237,8 +237,7 @@ def _read_batch(
             rows = batch[0][1].table(name).assign(run=runs[0])
         else:
             files = [path / f"{name}.parquet" for path in paths]
-            rows = read_parquet(files, name, COLUMNS[name])
-            rows = rows.assign(run=np.repeat(runs, [*map(count_rows, files)]))
+            rows = read_parquet(files, name, COLUMNS[name], runs)
         is_scores = name == "scores"
         yield rows[rows["final"] & (rows["variant"] != BASELINE)] if is_scores else rows
     except RoadevalError as error:
