@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from roadeval.runtime.settings import Flag
+from roadeval.data import is_plain
+from roadeval.runtime.settings import Checked, Flag
 
 SECTIONS: Final = (
     *("topics", "truth", "labels", "frames", "ground", "training", "evaluation", "output"),
@@ -15,6 +17,20 @@ SECTIONS: Final = (
 )
 """The tables that apply to all variants; `roadeval.config.run.RunConfig` has fields of their names.
 """
+
+
+LABEL: Final = 500
+"""Letters of a label's value, at most."""
+
+
+def _labels(labels: object) -> object:
+    """Return labels that have plain names, and a line of text each."""
+    for name, text in labels.items() if isinstance(labels, Mapping) else ():
+        if not is_plain(name):
+            raise ValueError("must have names of letters, digits, '-' and '_'")
+        if isinstance(text, str) and not (0 < len(text) <= LABEL and text.isprintable()):
+            raise ValueError(f"must be lines of at most {LABEL} letters")
+    return labels
 
 
 @dataclass(frozen=True)
@@ -30,6 +46,7 @@ class OutputSettings:
         those of every N-th frame. ``none`` makes no recording.
     focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
         that you bring, else ``filtered``.
+    labels: Label of the results, as branch=main, which changes no number.
     figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
     """
 
@@ -38,6 +55,9 @@ class OutputSettings:
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
     record: Annotated[str, Flag("--record", "WHAT")] = "all"
     focus: Annotated[str | None, Flag("--focus", "NAME", "Methods")] = None
+    labels: Annotated[Mapping[str, str], Checked(_labels), Flag("--label", "NAME=VALUE")] = field(
+        default_factory=dict
+    )
     figures: bool = True
 
 

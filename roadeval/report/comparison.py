@@ -102,7 +102,7 @@ def comment(
         head = ": ".join([sentences.headline([j.holds for j in judgements]), *failed[:1]])
     chief = replace(comparison, changes=tuple(comparison.finals()))
     for kind in ("drives", "regions", "moved"):
-        rows = tuple(row for row in getattr(chief, kind) if _MASK(row) == _MASK(mask))
+        rows: Any = tuple(row for row in getattr(chief, kind) if _MASK(row) == _MASK(mask))
         chief = replace(chief, **{kind: rows})
     first = Heading(f"roadeval: {head}; ERR of {text}", 2)
     tops = [first, *overview(chief, judgements, 10)], changed_drives(chief, 10)
@@ -152,19 +152,24 @@ def overview(
 
     ``judgements`` judge the limits of the command; at most ``most`` changed settings are named.
     """
-    for title, kind, tone in (
-        ("Limits exceeded", True, "warning"),
-        ("Not judged", None, "warning"),
-        ("Limits kept", False, "plain"),
-    ):
-        limits = [limit for limit in judgements if limit.holds is kind]
-        if lines := [sentences.describe_judgement(limit) for limit in limits]:
-            yield BulletList(title, lines, tone)
+    yield from limits(judgements)
     yield Text(sentences.verdict(comparison), "verdict")
     yield from (Text(line) for line in sentences.changed_settings(comparison, most))
     yield from _changes(comparison)
     if where := sentences.where(comparison):
         yield BulletList("Where", where)
+
+
+def limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
+    """Yield the judged limits of a command: those exceeded, not judged, and kept."""
+    for title, kind, tone in (
+        ("Limits exceeded", True, "warning"),
+        ("Not judged", None, "warning"),
+        ("Limits kept", False, "plain"),
+    ):
+        alike = [limit for limit in judgements if limit.holds is kind]
+        if lines := [sentences.describe_judgement(limit) for limit in alike]:
+            yield BulletList(title, lines, tone)
 
 
 def _changes(comparison: Comparison) -> Iterator[Block]:

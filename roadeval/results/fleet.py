@@ -36,6 +36,7 @@ from roadeval.results.facts import (
     FactsFile,
     FleetFacts,
     Member,
+    Origin,
     check_format,
     is_fleet,
 )
@@ -68,7 +69,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUN: Final = "run.toml"
-FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in OF_DRIVES))
+WRITTEN: Final = (*OF_DRIVES, "classes")
+"""The tables of all drives in one file; older fleets have no ``classes``."""
+FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
 """The files of a fleet's folder; beside them lie folders with the files of its drives."""
 RESULTS: Final = "results"
 PICTURES: Final = "pictures"
@@ -182,19 +185,29 @@ class FleetFolder:
         """The folder's name."""
         return self.path.resolve().name
 
-    def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
-        """Read a table of all drives, or of some of them.
+    def table(
+        self,
+        name: str,
+        drives: Collection[str] | None = None,
+        columns: Collection[str] | None = None,
+    ) -> pd.DataFrame:
+        """Read a table of all drives, or of some of them, of a file all columns or some.
 
         The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and those of
         `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
         of final masks.
         """
-        if name in OF_DRIVES:
-            rows = read_parquet([self.path / f"{name}.parquet"], name)
+        if name in OF_DRIVES or (self.has_classes and name == "classes"):
+            rows = read_parquet([self.path / f"{name}.parquet"], name, columns)
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
         return table_of_drives(self.path, name, chosen)
+
+    @property
+    def has_classes(self) -> bool:
+        """Whether ``classes`` of all drives is one file."""
+        return (self.path / "classes.parquet").is_file()
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -387,6 +400,7 @@ class FleetWriter:
         run_toml: str,
         *,
         asked: Mapping[str, str] | None = None,
+        origin: Origin | None = None,
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
@@ -403,6 +417,7 @@ class FleetWriter:
             read = partial(table_of_drives, self.folder)
             given = finals, members, settings, dict(run), within
             facts = summarise(*given, disturbances=disturbed, read=read)
+            facts = replace(facts, origin=origin)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts
@@ -430,7 +445,8 @@ class FleetWriter:
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
         made["worst"] = rank_worst(made["worst"])
-        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in OF_DRIVES})
+        made["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
+        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in WRITTEN})
         finals = {
             "drives": made["drives"],
             "scores": only(made["scores"], final=True, region=ALL),

@@ -88,4 +88,4 @@ def compare(
     if not (json or quiet):
         screen.show_verdict(compared.comparison, console.results())
     lost = messages.losses(compared.lost)
-    return messages.conditions(compared.held, compared.unjudged) or lost
+    return messages.conditions(compared.judgements) or lost

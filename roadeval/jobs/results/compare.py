@@ -16,13 +16,15 @@ from roadeval.evaluation.comparison.conditions import Condition, Judgement, judg
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
+from roadeval.jobs.results.history import last_good
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.comment import badge
 from roadeval.report.comparison import comment, document, markdown
-from roadeval.report.pdf.typeset import typeset, write_file
-from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
+from roadeval.report.pdf.typeset import write_file
+from roadeval.report.writing import write_document
+from roadeval.results.comparison import as_dict, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
 from roadeval.runtime.files import Paths, list_paths
@@ -52,29 +54,20 @@ class Compared:
         """The content of the JSON file."""
         return as_dict(self.comparison, self.judgements)
 
-    @property
-    def held(self) -> list[str]:
-        """The sentences of the conditions that hold."""
-        return [describe_judgement(judgement) for judgement in self.judgements if judgement.holds]
-
-    @property
-    def unjudged(self) -> list[str]:
-        """Why conditions could not be judged."""
-        return [describe_judgement(judged) for judged in self.judgements if judged.holds is None]
-
 
 def compare(
     results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 
-    A `RoadevalError` if a result cannot be read, or there is nothing to compare. Why a condition
-    cannot be judged is in `Compared.unjudged`.
+    A `RoadevalError` if a result cannot be read, or there is nothing to compare. A
+    condition that cannot be judged has a judgement that says why.
 
     Parameters
     ----------
     results
         Recordings, results folders or fleets' folders. Of a single one the variants are compared.
+        The base may be a folder of many runs: their last good one, see `roadeval.history`.
     variants
         Of several results: only these, where ``a=b`` holds the base's ``a`` against the others'
         ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
@@ -87,6 +80,7 @@ def compare(
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
+    paths[:1] = paths[:1] if across else [last_good(paths[0], paths[1:])]
     opened = [Result(path) for path in paths]
     if across:
         opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
@@ -165,26 +159,17 @@ def write(compared: Compared, path: Path, kind: str = "", command: str = "") -> 
     `RoadevalError` if the ending is another, or the file cannot be written.
     """
     about = compared.comparison, compared.judgements
-    match kind or path.suffix.lower():
-        case "junit":
-            content = junit_xml(*about)
-        case "comment":
-            content = comment(*about, over_drive(compared), command).encode()
-        case ".svg":
-            content = badge(*about).encode()
-        case ".pdf":
-            content = typeset(_document(compared))
-        case ".html":
-            from roadeval.report.page.render import page
-
-            content = page(_document(compared))
-        case ".md":
-            content = markdown(*about).encode()
-        case ".json":
-            content = as_json(compared).encode()
-        case _:
-            raise RoadevalError(f"{path}: a comparison is written as .pdf, .html, .md, .svg, .json")
-    return write_file(path, content)
+    if kind == "junit":
+        return write_file(path, junit_xml(*about))
+    if kind == "comment":
+        return write_file(path, comment(*about, over_drive(compared), command).encode())
+    if path.suffix.lower() == ".svg":
+        return write_file(path, badge(*about).encode())
+    return write_document(
+        *(path, "a comparison", lambda: _document(compared)),
+        lambda: markdown(*about),
+        lambda: as_json(compared),
+    )
 
 
 def _document(compared: Compared) -> Report:
