@@ -8,7 +8,6 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from roadeval.data import is_plain
 from roadeval.runtime.settings import Checked, Flag
 
 SECTIONS: Final = (
@@ -19,17 +18,14 @@ SECTIONS: Final = (
 """
 
 
-LABEL: Final = 500
-"""Letters of a label's value, at most."""
-
-
 def _labels(labels: object) -> object:
-    """Return labels that have plain names, and a line of text each."""
+    """Return labels of results, whose names are plain, and whose values are a line of text."""
+    from roadeval.data import is_plain
+
     for name, text in labels.items() if isinstance(labels, Mapping) else ():
-        if not is_plain(name):
-            raise ValueError("must have names of letters, digits, '-' and '_'")
-        if isinstance(text, str) and not (0 < len(text) <= LABEL and text.isprintable()):
-            raise ValueError(f"must be lines of at most {LABEL} letters")
+        if not is_plain(name) or not 0 < len(str(text)) <= 500 or not str(text).isprintable():
+            problem = "must be lines of at most 500 letters, with names of letters, digits, - and _"
+            raise ValueError(problem)
     return labels
 
 

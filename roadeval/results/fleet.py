@@ -186,10 +186,7 @@ class FleetFolder:
         return self.path.resolve().name
 
     def table(
-        self,
-        name: str,
-        drives: Collection[str] | None = None,
-        columns: Collection[str] | None = None,
+        self, name: str, drives: Collection[str] | None = None, columns: Collection[str] = ()
     ) -> pd.DataFrame:
         """Read a table of all drives, or of some of them, of a file all columns or some.
 

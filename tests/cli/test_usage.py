@@ -192,7 +192,7 @@ def test_no_command_at_all_shows_on_one_screen_what_to_type_first_as_wrong_usage
     ("words", "completed"),
     [
         ("roadeval rep", ["replay", "report"]),
-        ("roadeval replay --labe", ["--labelled"]),
+        ("roadeval replay --labe", ["--label", "--labelled"]),
         ("roadeval replay --preset r", ["robust"]),
         ("roadeval replay ./d", []),
     ],

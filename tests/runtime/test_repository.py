@@ -62,8 +62,7 @@ def test_a_git_that_does_not_answer_and_a_folder_that_has_gone_are_nothing(folde
     stuck.write_text("#!/bin/sh\nexec /bin/sleep 60\n")
     stuck.chmod(0o755)
     monkeypatch.setenv("PATH", str(folder))
-    monkeypatch.setattr("roadeval.runtime.repository._PATIENCE_S", 0.05)
-    assert current_commit() == NOTHING
+    assert current_commit(patience_s=0.05) == NOTHING
     stuck.unlink()
     folder.rmdir()
     assert current_commit() == NOTHING
