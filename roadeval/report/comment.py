@@ -92,7 +92,7 @@ def badge(comparison: Comparison, limits: Sequence[Judgement]) -> str:
     """Return ERR and its change as SVG, with a title for screen readers."""
     _, text, tone = standing(comparison, limits)
     title, shown = escape(elide(f"ERR of {text}, {tone}", 200)), text.rpartition(": ")[2]
-    colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 7 * len(shown)
+    colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 6 * len(shown)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width + 48}" height="20" role="img">'
         f'<title>{title}</title><rect width="36" height="20" fill="#333"/><rect x="36" '
