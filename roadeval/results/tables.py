@@ -228,11 +228,9 @@ def read_parquet(
             read_parquet([path], name, columns)  # the damaged one is named
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
-    counts = [name for name in table.column_names if table[name].type == pa.int64()]
-    whole = [name for name in counts if not table[name].null_count]
-    kinds = {} if len(whole) == len(counts) else {pa.int64(): pd.Int64Dtype()}
-    rows: pd.DataFrame = table.to_pandas(types_mapper=kinds.get)
-    return rows.astype(dict.fromkeys(whole, np.int64)) if kinds and whole else rows
+    rows: pd.DataFrame = table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
+    counts = [n for n in rows if rows[n].dtype == "Int64" and not rows[n].hasnans]
+    return rows.astype(dict.fromkeys(counts, np.int64)) if counts else rows
 
 
 def _read_files(

@@ -20,6 +20,7 @@ from roadeval.evaluation.comparison.pairing import ComparedDrive
 from roadeval.evaluation.score.scoreboard import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, values_of
+from roadeval.fleet.remote import local_path
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
     SUMMARY,
@@ -294,7 +295,7 @@ class Result:
     Parameters
     ----------
     paths
-        Recordings, results folders and fleets' folders, perhaps from elsewhere.
+        Recordings, results folders, fleets' folders, or URLs of recordings or of zips of these.
     focus
         The variant that they are about: verdict, worst frames, pictures. By default what they were
         made about.
@@ -311,7 +312,7 @@ class Result:
     """
 
     def __init__(self, *paths: str | Path, focus: str | None = None) -> None:
-        self.paths = tuple(map(Path, paths))
+        self.paths = tuple(map(local_path, paths))
         self._chosen: Final = focus
         self._opened: list[Opened] = [r for path in self.paths for r in _open(path, focus)]
         if focus:
