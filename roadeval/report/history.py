@@ -30,7 +30,7 @@ from roadeval.report.blocks import (
 from roadeval.report.captions import note
 from roadeval.report.chart import FAINT, WORSE, Chart, ChartKind, Look, Series, looks
 from roadeval.report.comparison import limits
-from roadeval.results.history import Event, History, describe_change, title_of, verdict
+from roadeval.results.history import Event, History, describe_change, verdict
 from roadeval.results.sentences import marked_interval
 
 BARS: Final = "▁▂▃▄▅▆▇█"
@@ -91,7 +91,7 @@ def events_table(history: History) -> Table:
     rows: Rows = []
     for event in reversed(history.events):
         change, difference = event.first, event.first.difference
-        title = f"{title_of(change.line)} of {change.line.variant}"
+        title = f"{change.line.title} of {change.line.variant}"
         cells = points(difference.mean), marked_interval(difference)
         reasons = "; ".join(event.reasons[:2])
         name = history.runs[event.run].name
@@ -103,7 +103,7 @@ def events_table(history: History) -> Table:
 def rates_table(lines: Sequence[Line]) -> Table:
     """Tabulate lines: their rates in the first and the last run, and their levels between."""
     rows: Rows = [
-        [line.variant, title_of(line), *_over_runs(line.rates, line.levels)] for line in lines
+        [line.variant, line.title, *_over_runs(line.rates, line.levels)] for line in lines
     ]
     columns = ["variant", "rate", "first %", "last %", "over the runs"]
     breaks = [n for n, row in enumerate(rows) if n and row[0] != rows[n - 1][0]]
@@ -137,7 +137,7 @@ def _figures(history: History) -> Iterator[Block]:
     parts.sort(key=lambda line: float(np.nanmin(line.levels) - np.nanmax(line.levels)))
     if parts:
         yield Heading(f"Where {history.focus} changed most", 2)
-        yield Figure([_chart(history, title_of(line), [line]) for line in parts[:ROWS]], "")
+        yield Figure([_chart(history, line.title, [line]) for line in parts[:ROWS]], "")
 
 
 def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
@@ -160,7 +160,7 @@ def _details(history: History, event: Event) -> Details:
     first, run = event.first, history.runs[event.run]
     blocks: list[Block] = [BulletList("What changed there", event.reasons)] if event.reasons else []
     changes: Rows = [
-        [c.line.variant, title_of(c.line), points(c.difference.mean), marked_interval(c.difference)]
+        [c.line.variant, c.line.title, points(c.difference.mean), marked_interval(c.difference)]
         for c in event.changes
     ]
     columns = ["variant", "rate", "change", "interval"]
@@ -170,7 +170,7 @@ def _details(history: History, event: Event) -> Details:
         [row["drive"], percent(row["before"]), percent(row["after"]), points(row["mean"])]
         for row in carrying.to_dict("records")
     ]
-    title = f"{title_of(first.line)} of the drives that changed most"
+    title = f"{first.line.title} of the drives that changed most"
     columns = ["drive", "before %", "after %", "change"]
     blocks.append(Table(columns, drives, caption=title, small=True))
     if event.frames:

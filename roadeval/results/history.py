@@ -10,10 +10,9 @@ from roadeval.data.words import counted, interval, percent, points
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.comparison.history import Change, Line
 from roadeval.evaluation.metrics import TESTED
-from roadeval.evaluation.regions import ALL, titles
+from roadeval.evaluation.regions import ALL
 from roadeval.results.comparison import condition_of
 from roadeval.results.facts import Origin
-from roadeval.results.schema import TAG
 from roadeval.results.sentences import is_sure
 
 FORMAT: Final = {"name": "roadeval-history", "version": 1}
@@ -113,25 +112,12 @@ def group_changes(changes: Sequence[Change], focus: str) -> list[Event]:
     return sorted(events, key=lambda event: event.run)
 
 
-def title_of(line: Line) -> str:
-    """Return the rate of a line and its pixels or drives, without the variant."""
-    match line.kind:
-        case "all":
-            return line.rate
-        case "region":
-            return f"{line.rate}, {titles([line.part])[line.part]}"
-        case "class":
-            return f"{line.rate}, {line.part}"
-        case _:
-            return f"{line.rate}, {line.kind.removeprefix(TAG)} {line.part}"
-
-
 def describe_change(change: Change, when: str = "") -> str:
     """Return how much a line changed, on which drives, and how sure that is of others."""
     difference, kind = change.difference, change.step.kind
     verb, count = ("rose", difference.worse) if difference.mean > 0 else ("fell", difference.better)
     slowly = {"drift": " slowly", "outlier": " for this run alone"}.get(kind, "")
-    text = f"{title_of(change.line)} of {change.line.variant} {verb}{slowly} by "
+    text = f"{change.line.title} of {change.line.variant} {verb}{slowly} by "
     text += f"{percent(abs(difference.mean))} points{when}"
     if difference.unit == "drives" and difference.units > 1:
         text += f", on {count} of {counted(difference.units, 'drive')}"
@@ -155,7 +141,7 @@ def verdict(history: History) -> str:
     parts = [c for c in ranked[0].changes if c.line.kind != ALL and c.line.variant == focus]
     most = max(parts, key=lambda part: abs(part.difference.mean), default=first)
     if abs(most.difference.mean) > 1.5 * abs(first.difference.mean):
-        text += f"; most of all {title_of(most.line)} ({points(most.difference.mean)})"
+        text += f"; most of all {most.line.title} ({points(most.difference.mean)})"
     if not standing:
         return f"{text}: the last change in {count}."
     more = f", as {len(ranked) - 1} more changes to the worse" if len(ranked) > 1 else ""

@@ -45,7 +45,7 @@ def test_the_bad_commit_is_named_on_terminal_page_and_in_json(nights, tmp_path):
     content = json.loads(facts)
     (event,) = content["events"]
     assert event["run"] == 21
-    assert any(reason.startswith("svm.c: 1 to 0.001") for reason in event["reasons"])
+    assert any(reason.startswith("svm.c 1 to 0.001") for reason in event["reasons"])
     assert len(event["frames"]) == 5
     assert content["last_good"] == [str(nights / "20")]
     assert b"badbadba" in page

@@ -36,7 +36,8 @@ def no_frames(line, before, after):
     raise AssertionError("several drives are judged over drives")
 
 
-def lines_of(rows, tags=()):
+def lines_of(rows):
+    tags = {"tag_light": "light"}
     lines = find_lines(rows, tags, RUNS)
     return {(line.kind, line.part, line.rate): line for line in lines}
 
@@ -80,12 +81,11 @@ def test_a_drive_of_other_pixels_begins_anew(column):
 
 
 def test_a_tag_is_a_line_of_its_drives_alone():
-    lines = lines_of(
-        rows_of(lambda run, drive: 0.02 * (run >= 7 and drive in "abc")), ["tag_light"]
-    )
-    dusk = lines["tag_light", "dusk", "ERR"]
+    lines = lines_of(rows_of(lambda run, drive: 0.02 * (run >= 7 and drive in "abc")))
+    dusk = lines["light", "dusk", "ERR"]
     assert dusk.drives["drive"].tolist() == ["a", "b", "c"]
     (step,) = dusk.steps
+    assert dusk.title == "ERR, light dusk"
     assert (step.run, step.change) == (7, pytest.approx(0.02))
 
 
@@ -102,7 +102,7 @@ def test_drives_of_a_group_count_as_one():
 
 
 def judged(rows, *texts, last=5):
-    lines, settings = find_lines(rows, (), RUNS), EvaluationSettings()
+    lines, settings = find_lines(rows, {}, RUNS), EvaluationSettings()
     conditions = [Condition.parse(text) for text in texts]
     return [*judge_last(lines, conditions, last, settings, no_frames)]
 
@@ -142,4 +142,4 @@ def test_the_only_drive_is_judged_over_its_frames():
 
     eight = lines_of(rows_of(lambda run, drive: 0.02 * (run >= 7)))[ERR]
     find_changes([lines_of(rows)[ERR]], 0.95, within)
-    assert asked == [(slice(0, 7), slice(7, 12))]
+    assert asked == [(range(7), range(7, 12))]

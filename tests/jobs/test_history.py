@@ -42,7 +42,7 @@ def test_the_run_that_is_worse_is_named_with_what_changed(made):
     assert event.run == 5
     assert event.first.line.name == "post.filtered.ERR"
     assert sorted(event.first.drives["drive"][:2]) == ["drive_0000-00000000", "drive_0003-00000003"]
-    assert event.reasons == ["commit: 444444444444 to 555555555555", "svm.C: 1 to 2"]
+    assert event.reasons == ["commit 444444444444 to 555555555555", "svm.C 1 to 2"]
     assert {drive for drive, _, _ in event.frames} == set(event.first.drives["drive"][:2])
     assert [run.title for run in made.runs][::7] == ["1972-09-27", "1972-10-04"]
     assert "in the run of 1972-10-02 (55555555), on 2 of 6 drives" in verdict(made)

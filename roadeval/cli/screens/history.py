@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from roadeval.cli.screens import tables
 from roadeval.data.words import counted
 from roadeval.evaluation.regions import ALL
-from roadeval.report.history import events_table, rates_table
-from roadeval.results.history import History, verdict
+from roadeval.report.blocks import BulletList
+from roadeval.report.history import rates_table
+from roadeval.results.history import History, describe_change, verdict
+
+EVENTS: Final = 8
+"""Newest changes that are shown."""
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,6 +29,10 @@ def show(history: History, out: Console) -> None:
     if not out.encoding.startswith("utf"):  # no bars
         rows = [row[:-1] for row in rates.rows]
         rates = replace(rates, columns=rates.columns[:-1], rows=rows, text_columns=(0, 1))
-    tables.show([rates, *([events_table(history)] if history.events else [])], out)
+    events = [
+        f"{runs[event.run].name}: {describe_change(event.first)}. There: {'; '.join(event.reasons)}"
+        for event in history.events[-EVENTS:]
+    ]
+    tables.show([rates, *([BulletList("Changes", events[::-1])] if events else [])], out)
     out.print()
     out.print(verdict(history), style="bold")

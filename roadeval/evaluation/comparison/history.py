@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -19,12 +19,12 @@ from roadeval.data.arrays import Flags, Floats, Sums
 from roadeval.evaluation.comparison.compare import MaskChange
 from roadeval.evaluation.comparison.conditions import Condition, Judgement
 from roadeval.evaluation.metrics import TESTED
-from roadeval.evaluation.regions import ALL
+from roadeval.evaluation.regions import ALL, titles
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference, holm, over_drives
 from roadeval.evaluation.stats.steps import Step, trace
-from roadeval.evaluation.tables import KEY, group_rows, only
+from roadeval.evaluation.tables import KEY, group_rows, only, values_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +46,8 @@ class Line(NamedTuple):
     part: str
     """The region, the class, or the value of the tag."""
     rate: str
+    title: str
+    """The rate and its pixels or drives for people, without the variant."""
     rates: Floats
     """``(T,)`` mean over the drives of each run; NaN where it has none."""
     levels: Floats
@@ -77,29 +79,41 @@ class Change(NamedTuple):
     """These drives with the means ``before`` and ``after``, the greatest change first."""
 
 
-def find_lines(rows: pd.DataFrame, tags: Sequence[str], count: int) -> list[Line]:
+def find_lines(rows: pd.DataFrame, tags: Mapping[str, str], count: int) -> list[Line]:
     """Return the lines of ``count`` runs, with their steps.
 
     ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
     ``part`` of the pixels: its rates, the drive's ``group``, the columns `PIXELS`, and those of the
-    drives' ``tags``. All lines are one family, see `roadeval.evaluation.stats.steps`.
+    drives' ``tags``, whose names are given by column. All lines are one family, see
+    `roadeval.evaluation.stats.steps`.
     """
-    parts = [(name, part) for name, part in group_rows(rows, ["variant", "kind", "part"])]
-    for tag in tags:
-        tagged = only(rows, kind=ALL)
-        by_value = group_rows(tagged[tagged[tag].notna()], ["variant", tag])
-        parts += [((name[0], tag, name[1]), part) for name, part in by_value]
+    parts = [*group_rows(rows, ["variant", "kind", "part"])]
+    masks = only(rows, kind=ALL)
+    for column, tag in tags.items():
+        by_value = group_rows(masks[masks[column].notna()], ["variant", column])
+        parts += [((variant, tag, value), part) for (variant, value), part in by_value]
     searched = [
-        (name, rate, part)
-        for name, part in parts
-        for rate in (MASK_RATES if name[1] == ALL else MASK_RATES[:1])
+        (address, rate, part)
+        for address, part in parts
+        for rate in (MASK_RATES if address[1] == ALL else MASK_RATES[:1])
     ]
-    return [_line(*address, count, len(searched)) for address in searched]
+    names = titles(values_of(only(rows, kind="region"), "part"))
+    family = len(searched)
+    return [_line(*one, names=names, count=count, family=family) for one in searched]
 
 
 def _line(
-    name: tuple[str, str, str], rate: str, rows: pd.DataFrame, count: int, family: int
+    address: tuple[str, str, str],
+    rate: str,
+    rows: pd.DataFrame,
+    *,
+    names: Mapping[str, str],
+    count: int,
+    family: int,
 ) -> Line:
+    variant, kind, part = map(str, address)
+    name = {ALL: "", "region": names.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
+    title = ", ".join(filter(None, (rate, name)))
     drive = group_rows(rows, [*KEY, *PIXELS]).ngroup().to_numpy()
     drives = rows[[*KEY, "group"]][~rows.duplicated([*KEY, *PIXELS])].astype("str")
     values = np.full((count, len(drives)), np.nan)
@@ -118,9 +132,7 @@ def _line(
         for step in traced.steps:
             before, run, after, found = (int(runs[place]) for place in step[1:5])
             steps.append(Step(step.kind, before, run, after, found, step.change))
-    variant, kind, part = name
-    stage = str(rows["stage"].iloc[-1])
-    about = variant, stage, kind, part, rate
+    about = variant, str(rows["stage"].iloc[-1]), kind, part, rate, title
     ends = np.zeros((0, count))
     if rate == TESTED and kind == ALL:
         ends = _ends(values, drives, steps, levels)
@@ -165,7 +177,7 @@ def _stretches(there: Flags) -> Iterator[Sums]:
         yield np.array(runs)
 
 
-Within = Callable[[Line, slice, slice], Difference]
+Within = Callable[[Line, range, range], Difference]
 """Returns the difference of a line within its only drive, from some runs to others, over frames."""
 
 
@@ -177,7 +189,7 @@ def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> li
             last = step.run if step.kind == "outlier" else step.after
             # The end of a drift, whose beginning is like the level before.
             first = last - (last - step.run) // 4 if step.kind == "drift" else step.run
-            runs = slice(step.before, step.run), slice(first, last + 1)
+            runs = range(step.before, step.run), range(first, last + 1)
             changes.append(Change(line, step, *_difference(line, *runs, confidence, within)))
     tested = [n for n, c in enumerate(changes) if (c.line.kind, c.line.rate) == (ALL, TESTED)]
     corrected = holm([changes[place].difference for place in tested])
@@ -187,12 +199,12 @@ def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> li
 
 
 def _difference(
-    line: Line, before: slice, after: slice, confidence: float, within: Within
+    line: Line, before: range, after: range, confidence: float, within: Within
 ) -> tuple[Difference, pd.DataFrame]:
     """Return the change over the drives that are in some of both runs, and these drives."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a drive that is in none of the runs
-        old, new = (np.nanmean(line.drive_rates[runs], axis=0) for runs in (before, after))
+        old, new = (np.nanmean(line.drive_rates[[*runs]], axis=0) for runs in (before, after))
     # Means of equal numbers may differ in their last digit.
     rows = line.drives.assign(before=old, after=new, mean=(new - old).round(12))
     rows = rows[rows["mean"].notna()]
@@ -223,7 +235,7 @@ def judge_last(
             yield condition.not_judged(label, f"it has no {name}; there are {names}")
             continue
         end = len(line.rates) - 1
-        runs = slice(max(end - earlier, 0), end), slice(end, end + 1)
+        runs = range(max(end - earlier, 0), end), range(end, end + 1)
         difference, rows = _difference(line, *runs, settings.confidence, within)
         if condition.is_change and not len(rows):
             why = f"no drive of it was scored alike in the {earlier} runs before"

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
+from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -54,6 +54,7 @@ DRIVES: Final = 3
 """Frames that are named of an event, and drives in which they are searched."""
 NEAR: Final = 10
 """Runs on both sides of a step whose frames are compared, if there is one drive."""
+UNKNOWN: Final = "nothing that the results know of"
 BATCH: Final = 50
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
@@ -65,6 +66,10 @@ COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "classes": (*KEY, "variant", "name", "truth", "pixels", "road", "frames"),
 }
 """Columns that are read of each table of a fleet."""
+
+
+ReadFrames = Callable[[int, tuple[str, str]], "pd.DataFrame"]
+"""Returns the rows of ``frames`` of final masks, in a run by its number, on a drive."""
 
 
 def history(
@@ -109,22 +114,22 @@ def history(
         problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
         raise RoadevalError(problem, remedy=remedy)
     numbered = [(n, opened[Path(path)]) for n, run in enumerate(runs) for path in run.paths]
-    on_progress(Progress(0, len(numbered), "reading", unit="results"))
-    rows = _join_tables(*(_read_table(numbered, name, lost) for name in COLUMNS))
+    rows = _read_rows(numbered, lost, on_progress)
     masks = rows[~rows.duplicated(["run", *KEY])].groupby("run")["frames"].agg(["size", "sum"])
     sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
     newest = Result(runs[-1].paths[0]).facts
     settings, focus = newest.evaluation, newest.focus or ""
-    tags = [str(name) for name in rows if str(name).startswith(TAG)]
+    tags = {str(name): str(name)[len(TAG) :] for name in rows if str(name).startswith(TAG)}
     lines = find_lines(rows, tags, len(runs))
-    within = partial(_within_drive, runs, settings)
+    read = lru_cache(4 * NEAR)(partial(_read_frames, runs))
+    within = partial(_within_drive, read, settings)
     events = [
-        replace(event, reasons=[*_reasons(runs, event)])
+        replace(event, reasons=[*_reasons(runs, event)] or [UNKNOWN])
         for event in group_changes(find_changes(lines, settings.confidence, within), focus)
     ]
     for event in events[-DETAILED:]:
-        event.frames.extend(_changed_frames(runs, event))
+        event.frames.extend(_changed_frames(read, event))
     judged = judge_last(lines, conditions, last, settings, within)
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
 
@@ -193,6 +198,48 @@ def _origin(result: Result, path: Path) -> Origin:
     return replace(origin, made_ns=file.stat().st_mtime_ns)
 
 
+def _read_rows(
+    numbered: Sequence[tuple[int, Result]], lost: list[str], on_progress: OnProgress
+) -> pd.DataFrame:
+    """Return the rows of some results for `find_lines`, by the number of their run."""
+    fleets = [one for one in numbered if one[1].fleet]
+    batches = [fleets[begin : begin + BATCH] for begin in range(0, len(fleets), BATCH)]
+    batches += [[one] for one in numbered if not one[1].fleet]
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in COLUMNS}
+    done = 0
+    for batch in batches:
+        on_progress(Progress(done, len(numbered), "reading", unit="results"))
+        done += len(batch)
+        for name, tables in parts.items():
+            tables.extend(table for table in _read_batch(batch, name, lost) if len(table))
+    if not parts["scores"]:
+        raise RoadevalError(lost[0] if lost else "nothing was scored in any of the runs")
+    parts["classes"] = parts["classes"] or [read_table("classes", "").assign(run=0)]
+    # To concatenate a single table takes as long as reading it.
+    return _join_tables(*(concatenate(t) if len(t) > 1 else t[0] for t in parts.values()))
+
+
+def _read_batch(
+    batch: Sequence[tuple[int, Result]], name: str, lost: list[str]
+) -> Iterator[pd.DataFrame]:
+    """Yield a table of one drive, or of some fleets: together unless one of them is damaged."""
+    if name == "classes":
+        batch = [one for one in batch if not one[1].fleet or one[1].fleet.has_classes]
+    runs, files = [run for run, _ in batch], [r.paths[0] / f"{name}.parquet" for _, r in batch]
+    try:
+        if batch and batch[0][1].fleet is None:
+            rows = batch[0][1].table(name).assign(run=runs[0])
+        else:
+            rows = read_parquet(files, name, COLUMNS[name], runs)
+        is_scores = name == "scores"
+        yield rows[rows["final"] & (rows["variant"] != BASELINE)] if is_scores else rows
+    except RoadevalError as error:
+        if len(batch) == 1:
+            lost.append(error.sentence)
+        else:
+            yield from chain(*(_read_batch([one], name, lost) for one in batch))
+
+
 def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFrame) -> pd.DataFrame:
     """Return the rows for `find_lines` from tables of all runs."""
     key = ["run", *KEY]
@@ -215,99 +262,66 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     return rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
 
 
-def _read_table(numbered: Sequence[tuple[int, Result]], name: str, lost: list[str]) -> pd.DataFrame:
-    """Return a table of some results, of fleets only some columns, by the number of their run."""
-    batches = [[one] for one in numbered if not one[1].fleet]
-    fleets = [(run, result) for run, result in numbered if result.fleet]
-    if name == "classes":
-        fleets = [(run, r) for run, r in fleets if r.fleet and r.fleet.has_classes]
-    batches += [fleets[begin : begin + BATCH] for begin in range(0, len(fleets), BATCH)]
-    parts = [part for batch in batches for part in _read_batch(batch, name, lost)]
-    parts = [part for part in parts if len(part)] or [read_table(name, "").assign(run=0)]
-    return concatenate(parts) if len(parts) > 1 else parts[0]
-
-
-def _read_batch(
-    batch: Sequence[tuple[int, Result]], name: str, lost: list[str]
-) -> Iterator[pd.DataFrame]:
-    """Yield a table of one drive, or of some fleets: together unless one of them is damaged."""
-    runs, paths = zip(*((run, result.paths[0]) for run, result in batch), strict=True)
-    try:
-        if batch[0][1].fleet is None:
-            rows = batch[0][1].table(name).assign(run=runs[0])
-        else:
-            files = [path / f"{name}.parquet" for path in paths]
-            rows = read_parquet(files, name, COLUMNS[name], runs)
-        is_scores = name == "scores"
-        yield rows[rows["final"] & (rows["variant"] != BASELINE)] if is_scores else rows
-    except RoadevalError as error:
-        if len(batch) == 1:
-            lost.append(error.sentence)
-        else:
-            yield from chain(*(_read_batch([one], name, lost) for one in batch))
-
-
-def _frames_of(run: RunFacts, drive: tuple[str, str], variant: str) -> pd.DataFrame:
-    """Return the rows of ``frames`` of a variant's final mask on a drive; none if they are gone."""
+def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> pd.DataFrame:
+    """Return the rows of ``frames`` of final masks on a drive; none if they are gone."""
     tables = [read_table("frames", "")]
-    for path in run.paths:
+    for path in runs[run].paths:
         with suppress(RoadevalError):
             tables.append(Result(path).table("frames", [drive]))
-    return only(finals(concatenate(tables)), variant=variant)
+    return finals(concatenate(tables))
 
 
 def _within_drive(
-    runs: Sequence[RunFacts],
-    settings: EvaluationSettings,
-    line: Line,
-    before: slice,
-    after: slice,
+    read: ReadFrames, settings: EvaluationSettings, line: Line, before: range, after: range
 ) -> Difference:
     """Return the change of a line within its only drive, over frames, as `Within` does."""
     (drive,) = line.drives[KEY].drop_duplicates().itertuples(index=False, name=None)
     sides = []
-    for part in (runs[before][-NEAR:], runs[after][:NEAR]):
-        rows = concatenate([_frames_of(run, drive, line.variant) for run in part])
+    for runs in (before[-NEAR:], after[:NEAR]):
+        rows = concatenate([only(read(run, drive), variant=line.variant) for run in runs])
         sides.append(rows.groupby(["camera", "stamp_ns"], observed=True)[line.rate].mean())
     pairs = sides[0].to_frame(f"{line.rate}_base").join(sides[1], how="inner").reset_index()
     return within_drive(pairs, line.rate, settings)
 
 
-def _changed_frames(runs: Sequence[RunFacts], event: Event) -> Iterator[tuple[str, int, float]]:
+def _changed_frames(read: ReadFrames, event: Event) -> Iterator[tuple[str, int, float]]:
     """Yield drive, number and change of the frames that changed most from the run before."""
-    change, worse = event.first, event.first.difference.mean > 0
-    variant, run = change.line.variant, event.run
-    for drive in change.drives[KEY].head(DRIVES).itertuples(index=False, name=None):
-        pairs = common_masks(*(_frames_of(r, drive, variant) for r in (runs[run - 1], runs[run])))
+    line, worse = event.first.line, event.first.difference.mean > 0
+    for drive in event.first.drives[KEY].head(DRIVES).itertuples(index=False, name=None):
+        sides = (only(read(run, drive), variant=line.variant) for run in (event.run - 1, event.run))
+        pairs = common_masks(*sides)
         pairs = pairs.assign(change=pairs[TESTED] - pairs[f"{TESTED}_base"])
         rows = most_changed_frames(pairs, FRAMES, harmed=worse)
         yield from zip(rows["drive"], rows["frame"], rows["change"], strict=True)
 
 
 def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
-    """Yield what differs between the run of an event and the one before."""
-    old, new = runs[event.run - 1], runs[event.run]
+    """Yield what differs between the run of an event, or the end of a drift, and the one before."""
+    step, line = event.first.step, event.first.line
+    places = event.run - 1, step.after if step.kind == "drift" else event.run
+    old, new = (runs[place] for place in places)
     before, after = Result(*old.paths), Result(*new.paths)
-    parts = {
+    parts: dict[str, tuple[Any, Any]] = {
         "commit": (old.origin.commit[:12], new.origin.commit[:12]),
         "uncommitted changes": (old.origin.dirty, new.origin.dirty),
-        **{
-            f"label {name}": (old.origin.labels.get(name), value)
-            for name, value in new.origin.labels.items()
-        },
     }
     drives = {drive.key: drive for drive in before.compared}
     parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
-    versions = [
-        facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version}
-        for facts in (before.facts, after.facts)
+    named = [
+        {f"label {name}": value for name, value in run.origin.labels.items()}
+        | (facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version})
+        for run, facts in ((old, before.facts), (new, after.facts))
     ]
-    parts |= {name: (versions[0].get(name), version) for name, version in versions[1].items()}
-    yield from (f"{k}: {setting(a)} to {setting(b)}" for k, (a, b) in parts.items() if a != b)
-    there = ~np.isnan(event.first.line.drive_rates)
-    names = event.first.line.drives["drive"].to_numpy()
-    had, has = (set(names[there[run]]) for run in (event.run - 1, event.run))
-    for title, which in (("new drives", has - had), ("drives that are gone", had - has)):
+    parts |= {name: (named[0].get(name), value) for name, value in named[1].items()}
+    yield from (f"{k} {setting(a)} to {setting(b)}" for k, (a, b) in parts.items() if a != b)
+    had, has = (~np.isnan(line.drive_rates[place]) for place in places)
+    names = line.drives["drive"].to_numpy()
+    came, gone, kept = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
+    for title, which in (
+        ("new drives", came - gone),
+        ("drives that are gone", gone - came),
+        ("drives with other frames or another truth", (came & gone) - kept),
+    ):
         if which:
             yield f"{title}: {first_of(sorted(which), DRIVES)}"
 
