@@ -53,8 +53,9 @@ PART: Final = 64 << 10
 ROOM: Final = 2 << 30
 """Bytes of a result that are fetched, and unpacked, at most."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
-_fetched: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))
-"""The folder of what is fetched whole, removed at the end of the process."""
+FETCHED: Final[dict[Path, str]] = {}
+"""Public URLs of results that were fetched, by their paths."""
+_home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # until the process ends
 _POLL_S: Final = 0.2
 """Seconds between two checks for an answer."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
@@ -100,27 +101,27 @@ def local_path(result: str | PathLike[str]) -> Path:
     remote = open_source(result)
     if isinstance(remote, Path):
         return remote
-    folder = Path(mkdtemp(dir=_fetched().name))
-    path = folder / remote.path
+    path = Path(mkdtemp(dir=_home().name), remote.path)
     try:
         if remote.file.seek(0, os.SEEK_END) > ROOM:
             raise ValueError(TOO_LARGE)
         remote.file.seek(0)
         with path.open("wb") as file:
             shutil.copyfileobj(remote.file, file, 8 << 20)
-        if not is_zipfile(path):
-            return path
-        with ZipFile(path) as archive:  # a file takes at least a block
-            if sum(entry.file_size + 4096 for entry in archive.infolist()) > ROOM:
-                raise ValueError(TOO_LARGE)
-            archive.extractall(unpacked := folder / "unpacked" / path.stem)
-        kinds = ([*unpacked.rglob(name)] for name in (FLEET, SUMMARY, "*.rrd"))
-        files = next(filter(None, kinds), [])
-        if len(files) != 1:
-            raise ValueError(f"it holds {len(files) or 'no'} results")
+        if is_zipfile(path):
+            with ZipFile(path) as archive:  # a file takes at least a block
+                if sum(entry.file_size + 4096 for entry in archive.infolist()) > ROOM:
+                    raise ValueError(TOO_LARGE)
+                archive.extractall(unpacked := path.parent / "unpacked" / path.stem)
+            kinds = ([*unpacked.rglob(name)] for name in (FLEET, SUMMARY, "*.rrd"))
+            files = next(filter(None, kinds), [])
+            if len(files) != 1:
+                raise ValueError(f"it holds {len(files) or 'no'} results")
+            path = files[0] if files[0].suffix == ".rrd" else files[0].parent
     except (OSError, ValueError, RuntimeError, EOFError, BadZipFile, zlib.error) as error:
         raise FleetError(f"cannot be used: {error}", where=remote.source) from error
-    return files[0] if files[0].suffix == ".rrd" else files[0].parent
+    FETCHED[path] = remote.source
+    return path
 
 
 def file_name(url: str) -> str:
