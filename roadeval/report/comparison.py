@@ -104,9 +104,8 @@ def comment(
     for kind in ("drives", "regions", "moved"):
         rows: Any = tuple(row for row in getattr(chief, kind) if _MASK(row) == _MASK(mask))
         chief = replace(chief, **{kind: rows})
-    first = Heading(f"roadeval: {head}; ERR of {text}", 2)
-    tops = [first, *overview(chief, judgements, 10)], changed_drives(chief, 10)
-    texts = [fit(part) for part in (*tops, _warnings(comparison))]
+    first = [Heading(f"roadeval: {head}; ERR of {text}", 2), *overview(chief, judgements, 10)]
+    texts = [*map(fit, (first, changed_drives(chief, 10), _warnings(comparison)))]
     texts += [*_pictures(chief, mask, over), f"Again: {in_code(command)}\n"]
     rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
     for title, part in rest.items():

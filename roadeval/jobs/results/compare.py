@@ -201,11 +201,7 @@ def _frames(side: Side) -> pd.DataFrame:
 
 
 def over_drive(compared: Compared) -> list[Chart]:
-    """Return ERR over the one drive that is compared, and the baseline's; none of several.
-
-    Of a variant it is that of the frames on which all results have its mask. Where the variants of
-    one result are compared, each is a result.
-    """
+    """Return ERR over the one drive, and the baseline's, on the frames that all results have."""
     masks_of = {side.label: finals(_frames(side)) for side in compared.sides}
     alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
     masks, parts = {}, []
