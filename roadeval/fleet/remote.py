@@ -98,7 +98,10 @@ def local_path(result: str | PathLike[str]) -> Path:
 
     A `FleetError` if it cannot be fetched or unpacked, or has more than `ROOM` bytes.
     """
-    remote = open_source(result)
+    if is_url(url := os.fspath(result)) and url.endswith("/"):
+        remedy = "name a recording, or a zip"
+        raise FleetError("a folder is not fetched", where=public_source(url), remedy=remedy)
+    remote = open_source(url)
     if isinstance(remote, Path):
         return remote
     path = Path(mkdtemp(dir=_home().name), remote.path)
