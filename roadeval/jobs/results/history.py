@@ -32,6 +32,7 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
 from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
+from roadeval.fleet.remote import local_path
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import Result
 from roadeval.report.history import document, markdown
@@ -98,7 +99,7 @@ def history(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     lost: list[str] = []
-    paths = [path for given in list_paths(results) for path in find_results(Path(given))]
+    paths = [path for given in list_paths(results) for path in find_results(local_path(given))]
     opened: dict[Path, Result] = {}
     for path in paths:
         try:
