@@ -16,6 +16,7 @@ from roadeval.evaluation.comparison.conditions import Condition, Judgement, judg
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
+from roadeval.fleet.remote import local_path
 from roadeval.jobs.results.history import last_good
 from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, looks, looks_of_results
@@ -76,7 +77,7 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [Path(path) for path in list_paths(results)]
+    paths = [local_path(path) for path in list_paths(results)]
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1

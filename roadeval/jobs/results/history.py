@@ -32,6 +32,7 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
 from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
+from roadeval.fleet.remote import local_path
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import Result
 from roadeval.report.history import document, markdown
@@ -63,7 +64,7 @@ COLUMNS: Final[Mapping[str, Sequence[str]]] = {
         *MASK_RATES,
     ),
     "drives": (*KEY, "name", "log_digest", "group", "status"),
-    "classes": (*KEY, "variant", "name", "truth", "pixels", "road", "frames"),
+    "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
 }
 """Columns that are read of each table of a fleet."""
 
@@ -98,7 +99,7 @@ def history(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     lost: list[str] = []
-    paths = [path for given in list_paths(results) for path in find_results(Path(given))]
+    paths = [path for given in list_paths(results) for path in find_results(local_path(given))]
     opened: dict[Path, Result] = {}
     for path in paths:
         try:
@@ -179,8 +180,9 @@ def _runs_in_order(
         datetime.fromtimestamp((members[0][0].made_ns or 0) / 1e9, UTC)
         for members in groups.values()
     ]
-    is_daily = len({time.date() for time in times}) == len(times)
-    form = "%Y-%m-%d" if is_daily else "%Y-%m-%d %H:%M"
+    forms = ("%Y-%m-%d", "%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S")
+    distinct = (form for form in forms if len({f"{time:{form}}" for time in times}) == len(times))
+    form = next(distinct, forms[-1])
     return [
         RunFacts(
             tuple(p for _, p in members), members[0][0], title=name if by else f"{time:{form}}"
@@ -247,7 +249,9 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     classes = classes[is_class & (classes["pixels"] > 0)]
     right = classes["road"] / classes["pixels"]
     wrong = right.where(classes["truth"] == "other", 1 - right)
-    of_classes = classes.assign(kind="class", part=classes["name"], ERR=wrong, N=classes["pixels"])
+    texts = classes["name"].astype(str)
+    part = texts.where(texts != "", "class " + classes["class"].astype(str))
+    of_classes = classes.assign(kind="class", part=part, ERR=wrong, N=classes["pixels"])
     kind = np.where(scores["region"] == ALL, ALL, "region")
     of_masks = scores.assign(kind=kind, part=scores["region"], road=scores["TP"] + scores["FN"])
     about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]

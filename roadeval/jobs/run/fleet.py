@@ -98,8 +98,7 @@ def replay_fleet(
     on_progress
         Called in the caller's thread as drives are done.
     """
-    commit = current_commit()
-    config = (config or RunConfig()).resolved()
+    commit, config = current_commit(), (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in list_paths(drives)])
     if config.cameras:
         entries = name_cameras(
@@ -121,9 +120,9 @@ def replay_fleet(
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
     asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    origin = Origin(time.time_ns(), *commit, dict(config.output.labels))
-    given = members, config.evaluation, config.as_dict(), text
-    facts = writer.finish(*given, asked=asked, origin=origin)
+    how = config.evaluation, config.as_dict(), text
+    origin = Origin(time.time_ns(), *commit, {**config.output.labels})
+    facts = writer.finish(members, *how, asked=asked, origin=origin)
     counts = Counter(drive.status for drive in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not drive.repeated for drive in run.done.values())
