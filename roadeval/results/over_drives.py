@@ -87,9 +87,6 @@ def summarise(
         run=run,
         misfits=[*_misfits(rows)],
         disturbances=_degradations(disturbances or {}, groups, settings.confidence),
-        slices={}
-        if read is None
-        else slices_over_drives(read, drives, groups, settings.confidence),
     )
     facts = replace(facts, verdict=verdict_on(facts))
     if read is None:

@@ -345,7 +345,7 @@ def _compare_two(
     if one_camera and across_variants:
         disagreed = disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
     of_masks, of_regions = (None, None) if several else (pairs, parts)
-    changed = _changed_settings(matched)
+    changed = changed_settings(matched)
     old_classes = base.table("classes", {old: key for key, old in base_keys.items()})
     new_classes = new.table("classes", {key: key for key in base_keys})
     return Comparison(
@@ -590,7 +590,7 @@ def _warnings(
         )
 
 
-def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
+def changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
     """Return both values of the settings that both know and that differ."""
     changed: dict[str, tuple[Any, Any]] = {}
     for base, new in pairs:

@@ -13,7 +13,7 @@ import numpy as np
 from roadeval.data import Rgb, as_plain
 from roadeval.data.words import percent
 from roadeval.errors import RoadevalError
-from roadeval.fleet.remote import open_source
+from roadeval.fleet.remote import local_path, open_source
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.frames import FramePicker, facts_of
@@ -50,7 +50,7 @@ def clip(
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
     if form is None and place.suffix.lower() in VIDEO_SUFFIXES:
         raise RoadevalError("a clip ends in .mp4 or .gif", where=place)
-    results = [Result(path, focus=focus) for path in find_recordings(Path(result))]
+    results = [Result(path, focus=focus) for path in find_recordings(local_path(result))]
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
     if not scenes or (form and len(scenes) > 1):

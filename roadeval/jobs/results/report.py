@@ -11,6 +11,7 @@ from typing import Final, Literal
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
+from roadeval.fleet.remote import FETCHED
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import FramePicker, evenly
@@ -60,8 +61,9 @@ def write_report(
     (source,) = opened.paths
     name = opened.drive.camera if opened.drive else ""
     camera = f"-{as_plain(name)}" if name else ""
-    usual = Path("reports", f"{source.stem}{camera}.pdf") if opened.recording else None
-    path = Path(output or usual or source / f"report{camera}.pdf")
+    usual = opened.recording or source in FETCHED
+    beside = Path("reports", f"{source.stem}{camera}") if usual else source / f"report{camera}"
+    path = Path(output or beside.with_name(f"{beside.name}.pdf"))
     if not (output or usual) and leads_outside(path, source):  # it may come from someone else
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
     with holding(path, inputs=[source]):

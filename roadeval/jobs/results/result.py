@@ -20,6 +20,7 @@ from roadeval.evaluation.comparison.pairing import ComparedDrive
 from roadeval.evaluation.score.scoreboard import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, values_of
+from roadeval.fleet.remote import FETCHED, local_path
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
     SUMMARY,
@@ -119,7 +120,8 @@ class DriveResult:
     def inspect(self, frame: int | str) -> str:
         """Return the command that opens a frame in the viewer."""
         camera = ["--camera", self.camera] if self.camera else []
-        words = ["roadeval", "inspect", str(self.viewable or self.path), *camera]
+        path = self.viewable or self.path
+        words = ["roadeval", "inspect", FETCHED.get(path, str(path)), *camera]
         return f"{shlex.join(words)} --frame {frame}"
 
     @cached_property
@@ -281,6 +283,8 @@ def _open(path: Path, focus: str | None) -> list[Opened]:
         drive = DriveResult(path, focus=focus)
     except SeveralCamerasError as error:
         return [DriveResult(path, name, focus) for name in error.cameras]
+    except RoadevalError as error:
+        raise error.of(error, FETCHED.get(path, "")) from error
     cameras = drive.facts.cameras if drive.recording is None else ()
     return [DriveResult(path, name, focus) for name in cameras] or [drive]
 
@@ -294,7 +298,7 @@ class Result:
     Parameters
     ----------
     paths
-        Recordings, results folders and fleets' folders, perhaps from elsewhere.
+        Recordings, results folders, fleets' folders, or URLs of recordings or of zips of these.
     focus
         The variant that they are about: verdict, worst frames, pictures. By default what they were
         made about.
@@ -311,7 +315,7 @@ class Result:
     """
 
     def __init__(self, *paths: str | Path, focus: str | None = None) -> None:
-        self.paths = tuple(map(Path, paths))
+        self.paths = tuple(map(local_path, paths))
         self._chosen: Final = focus
         self._opened: list[Opened] = [r for path in self.paths for r in _open(path, focus)]
         if focus:
