@@ -108,16 +108,17 @@ def _levels(values: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 
 def _noises(jumps: Floats, odds: float) -> Floats:
-    """Return the median of the n jumps before a run, as a noise, wider if n is small."""
+    """Return a run's noise: the median jump before it, or of the last 20; wide after a few."""
     past, known = jumps[~np.isnan(jumps)], np.append(0, np.cumsum(~np.isnan(jumps)))
-    medians = [np.sort(past[:n])[(n - 1) // 2] / 0.6745 for n in range(1, len(past) + 1)]
-    wider = np.exp(odds / np.arange(1, len(past) + 1))
-    return np.append(math.inf if odds else 0.0, medians * wider)[known]
+    number = np.arange(1, len(past) + 1)
+    parts = [(np.sort(past[:n]), np.sort(past[max(n - 20, 0) : n])) for n in number.tolist()]
+    medians = [max(part[(len(part) - 1) // 2] for part in pair) / 0.6745 for pair in parts]
+    return np.append(math.inf if odds else 0.0, medians * np.exp(odds / number))[known]
 
 
 def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[int, Floats]:
     """Return the first run at which two levels fit better by the limit, 0 if none; and noises."""
-    noises = 1.1 ** np.ceil(np.log(np.maximum(noises, LEAST_NOISE)) / math.log(1.1))  # Few fits.
+    noises = 1.1 ** np.ceil(np.log(np.maximum(noises, 1e-9)) / math.log(1.1))  # Few fits.
     first, spread = len(level), width
     for noise in dict.fromkeys(noises[np.isfinite(noises)].tolist()):
         looks = np.flatnonzero(noises[:first] == noise)

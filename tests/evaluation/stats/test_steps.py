@@ -30,6 +30,18 @@ def test_an_exact_history_names_a_change_in_its_first_run(before: int, family: i
     assert step.change == pytest.approx(0.05 * POINT)
 
 
+def test_a_change_of_some_drives_in_an_exact_history_is_named_in_its_first_run() -> None:
+    values = exact(*[0.0] * 120, drives=20)
+    values[100:, 3] += 2 * POINT
+    assert [(step.run, step.found) for step in look(values)] == [(100, 100)]
+
+
+def test_a_tool_that_ceases_to_be_exact_soon_names_no_more() -> None:
+    steps = look(exact(*[0.0] * 60, *np.random.default_rng(1).normal(size=50)))
+    assert steps[0].found == 60
+    assert steps[-1].found < 75
+
+
 def test_a_step_of_one_run_becomes_an_outlier_and_the_old_level_goes_on() -> None:
     values = exact(0, 0, 0, 0, 2, 0, 0, 1, 1)
     assert [step.kind for step in look(values[:5])] == ["step"]
