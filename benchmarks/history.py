@@ -70,8 +70,8 @@ def exchanged(rng: Random, runs: int, drives: int) -> Values:
 
 
 def growing(rng: Random, runs: int, drives: int) -> Values:
-    """Return runs whose drives grow from a fifth, at least three, to all."""
-    there = np.arange(drives) < np.linspace(max(drives / 5, 3), drives, runs)[:, None]
+    """Return runs whose drives grow from a fifth to all."""
+    there = np.arange(drives) < np.linspace(drives / 5, drives, runs)[:, None]
     return np.where(there, missing(rng, runs, drives), np.nan)
 
 
@@ -177,12 +177,12 @@ def powers(histories: int) -> Iterator[str]:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--years", type=int, default=500, help="years a number")
-    parser.add_argument("--histories", type=int, default=100, help="planted histories a cell")
+    parser.add_argument("--years", type=int, default=100, help="years a number")
+    parser.add_argument("--histories", type=int, default=60, help="planted histories a cell")
     parser.add_argument("--write", action="store_true", help="into the page, too")
     options = parser.parse_args()
     show("found", powers(options.histories), write=options.write, page=PAGE)
-    family = [family_alarms(options.years // 5)]
+    family = [family_alarms(options.years // 2)]
     show("family", family, write=options.write, page=PAGE)
     show("false alarms", false_alarms(options.years), write=options.write, page=PAGE)
 

@@ -151,7 +151,7 @@ def test_few_runs_name_nothing_by_chance(noise: str) -> None:
 
 @pytest.mark.parametrize("noise", ["t3", "contaminated"])
 def test_a_year_with_heavy_tails_names_nothing_by_chance(noise: str) -> None:
-    """At half the limit, 3 of these 10 years would name something."""
+    """At half the limit, 1 and 3 of these 10 years would name something."""
     assert count_false(noise, 365, 10) == 0
 
 
