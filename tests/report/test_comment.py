@@ -72,7 +72,7 @@ def test_a_comment_fits_whatever_comes_in_and_says_what_is_left_out(name):
     limit = Condition.parse("post.v1.ERR > +0.5pp")
     text = comment(comparison, [*judge(comparison, [limit], EvaluationSettings())], [], name)
     assert len(text.encode()) <= MOST
-    first = "### roadeval: failed, 1 of 1 limits exceeded: post.v1.ERR > +0.5pp; ERR of v0: 11.2 %"
+    first = "## roadeval: failed, 1 of 1 limits exceeded: post.v1.ERR > +0.5pp; ERR of v0: 11.2 %"
     assert text.startswith(first)
     assert "| v0 | post | ERR |" in text
     assert "Left out here: " in text
