@@ -96,6 +96,12 @@ def test_a_badge_has_a_colour_for_better_worse_and_chance_and_a_title(change, co
     ElementTree.fromstring(svg)
 
 
+def test_results_without_a_final_mask_in_common_have_a_comment_all_the_same():
+    text = comment(a_comparison(a_change(WORSE, final=False)), [], [], "roadeval compare a b")
+    assert text.startswith("## roadeval: worse; ERR of filtered: 11.2 % (+1.2 pp)\n")
+    assert "\nAgain: `roadeval compare a b`\n" in text
+
+
 def test_a_badge_is_red_if_a_limit_cannot_be_judged():
     comparison = a_comparison(a_change(BETTER))
     limit = Condition.parse("post.nothing.ERR > +0.5pp")
