@@ -42,6 +42,7 @@ from roadeval.results.history import Event, History, RunFacts, as_dict, group_ch
 from roadeval.results.schema import TAG
 from roadeval.results.tables import read_parquet, read_table
 from roadeval.runtime.files import Paths, list_paths
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -194,10 +195,10 @@ def _runs_in_order(
 def _origin(result: Result, path: Path) -> Origin:
     """Return how a result was made; its time is that of its file if it does not say."""
     origin = result.facts.origin or Origin()
-    if origin.made_ns is not None:
-        return origin
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
-    return replace(origin, made_ns=file.stat().st_mtime_ns)
+    made_ns = origin.made_ns or file.stat().st_mtime_ns
+    labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+    return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
 
 
 def _read_rows(

@@ -154,8 +154,8 @@ class Browser {
     const [table, names] = [this.about.querySelector("table"), Object.keys(this.data.counts)];
     const scored = names.filter((name) => this.countsOf(name, this.frame) && isShown(name));
     const cells = (tag, texts) => {
-      const line = document.createElement("tr");
-      line.append(...texts.map((text, place) => Object.assign(document.createElement(place ? tag : "th"), { textContent: text, scope: place ? "" : tag === "th" ? "col" : "row" })));
+      const line = make("tr");
+      line.append(...texts.map((text, place) => make(place ? tag : "th", { textContent: text, scope: place ? "" : tag === "th" ? "col" : "row" })));
       const dot = this.ratesTable?.querySelector(`tr[data-of="${CSS.escape(texts[0])}"] .dot`);
       if (dot) line.cells[0].prepend(dot.cloneNode(true));
       return line;
@@ -188,8 +188,7 @@ class Browser {
   }
 
   frameButton(frame) {
-    const button = document.createElement("button");
-    [button.type, button.textContent] = ["button", frame];
+    const button = make("button", { type: "button", textContent: frame });
     button.addEventListener("click", () => this.show(frame, { follow: true }));
     return button;
   }
@@ -199,11 +198,19 @@ class Browser {
     this.filter();
     this.judge();
     if (this.frame === undefined) return;
-    const counts = (frame) => this.countsOf(choice.focus, frame);
-    const scored = this.shown().filter(counts);
-    const error = (frame) => RATES.ERR(counts(frame));
-    if (!isInRange(this.frame) && scored.length) this.show(scored.reduce((worst, frame) => (error(frame) > error(worst) ? frame : worst)), { address: null });
+    const worst = this.worstOf(this.shown());
+    if (!isInRange(this.frame) && worst !== undefined) this.show(worst, { address: null });
     this.writeAddress();
+  }
+
+  errorOf(frame) {
+    return RATES.ERR(this.countsOf(choice.focus, frame));
+  }
+
+  /** The frame with the highest error rate of the focus; undefined if none was scored. */
+  worstOf(frames) {
+    const scored = frames.filter((frame) => this.countsOf(choice.focus, frame));
+    return scored.reduce((worst, frame) => (this.errorOf(frame) > this.errorOf(worst) ? frame : worst), scored[0]);
   }
 
   /** Say how wrong the focus is, on the whole drive or on the chosen part of it. */
@@ -220,11 +227,9 @@ class Browser {
       this.verdict.textContent = fill(words["verdict of a range"], { ...named, ...rates(choice.focus) });
     }
     const link = document.querySelector("#summary .links a");
-    const scored = inside.filter((frame) => this.countsOf(choice.focus, frame));
-    if (link && scored.length) {
-      const error = (frame) => RATES.ERR(this.countsOf(choice.focus, frame));
-      const worst = scored.reduce((most, frame) => (error(frame) > error(most) ? frame : most));
-      link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(error(worst), 1) });
+    const worst = this.worstOf(inside);
+    if (link && worst !== undefined) {
+      link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(this.errorOf(worst), 1) });
       link.hash = `#frame-${worst}`;
       link.onclick = (event) => {
         event.preventDefault();
@@ -241,14 +246,12 @@ class Browser {
     this.thresholdBox = this.about.querySelector(".threshold");
     if (!this.thresholdBox) return;
     const [input, button] = [this.thresholdBox.querySelector("input"), this.thresholdBox.querySelector("button")];
-    input.addEventListener("input", () => {
-      this.setLevel(Number(input.value));
+    const set = (level) => {
+      this.setLevel(level);
       this.writeAddress();
-    });
-    button.addEventListener("click", () => {
-      this.setLevel(undefined);
-      this.writeAddress();
-    });
+    };
+    input.addEventListener("input", () => set(Number(input.value)));
+    button.addEventListener("click", () => set(undefined));
   }
 
   setLevel(level) {

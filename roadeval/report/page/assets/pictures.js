@@ -5,12 +5,8 @@ let onClosed = null;
 
 /** Show something over the page until it is closed. */
 function enlarge(content, closed = null) {
-  const inside = document.createElement("div");
-  inside.className = "inside";
-  const button = document.createElement("button");
-  button.type = "button";
-  button.className = "closing";
-  button.textContent = "Close";
+  const inside = make("div", { className: "inside" });
+  const button = make("button", { type: "button", className: "closing", textContent: "Close" });
   button.addEventListener("click", () => dialog.close());
   inside.append(button, ...content);
   dialog.replaceChildren(inside);
@@ -26,13 +22,8 @@ dialog.addEventListener("click", (event) => {
   if (event.target === dialog) dialog.close();
 });
 
-function enlargePicture(image) {
-  const large = document.createElement("img");
-  [large.src, large.alt] = [image.src, image.alt];
-  const words = document.createElement("p");
-  words.className = "note";
-  words.textContent = image.alt;
-  enlarge([large, words]);
+function enlargePicture({ src, alt }) {
+  enlarge([make("img", { src, alt }), make("p", { className: "note", textContent: alt })]);
 }
 
 /** Two pictures of the film over each other: one to the left of the slider, one to the right. */

@@ -4,9 +4,7 @@
 function makeCommands() {
   if (!navigator.clipboard) return;
   for (const command of document.querySelectorAll(".command")) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = "Copy";
+    const button = make("button", { type: "button", textContent: "Copy" });
     button.addEventListener("click", async () => {
       await navigator.clipboard.writeText(command.querySelector("code").textContent);
       button.textContent = "Copied";
