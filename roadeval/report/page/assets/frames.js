@@ -30,18 +30,13 @@ class Browser {
     this.tools();
     this.filters();
     this.threshold();
-    for (const row of this.rows) {
-      row.addEventListener("click", (event) => {
-        event.preventDefault();
-        this.show(Number(row.dataset.frame));
-      });
-    }
-    for (const link of document.querySelectorAll('a[href^="#frame-"]:not(.frames a)')) {
-      link.addEventListener("click", (event) => {
-        event.preventDefault();
-        this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
-      });
-    }
+    document.addEventListener("click", (event) => {
+      const [row, link] = [".frames tbody tr", 'a[href^="#frame-"]'].map((part) => event.target.closest(part));
+      if (!row && !link) return;
+      event.preventDefault();
+      if (row) this.show(Number(row.dataset.frame));
+      else this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
+    });
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
     range.frames = this.data.frames;
     range.onChange.push(() => this.narrow());
@@ -231,10 +226,6 @@ class Browser {
     if (link && worst !== undefined) {
       link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(this.errorOf(worst), 1) });
       link.hash = `#frame-${worst}`;
-      link.onclick = (event) => {
-        event.preventDefault();
-        this.show(worst, { scroll: true });
-      };
       const command = document.querySelector("#summary .links code");
       if (command) command.textContent = this.element.dataset.command.replace("{}", worst);
     }
