@@ -98,7 +98,7 @@ def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
 
 def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
     preset = findings.facts.run.get("preset")
-    ran = findings.finals if isinstance(findings, FleetFolder) else findings.facts.settings
+    ran = findings.facts.finals if isinstance(findings, FleetFolder) else findings.facts.settings
     if {FILTERED, UNFILTERED}.isdisjoint(ran):  # the preset's chain did not run
         preset = None
     if isinstance(findings, FleetFolder):

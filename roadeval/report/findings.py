@@ -103,14 +103,9 @@ class Findings:
         """Height of the frames in pixels."""
         return self.facts.drive.height
 
-    @property
-    def finals(self) -> Mapping[str, str]:
-        """Each scored variant's final stage."""
-        return self.facts.finals
-
     def total(self, variant: str) -> Mapping[str, Any]:
         """Return the counts and rates of a variant's final mask."""
-        return self.facts.totals[variant][self.finals[variant]]
+        return self.facts.totals[variant][self.facts.finals[variant]]
 
     @cached_property
     def windows(self) -> pd.DataFrame:

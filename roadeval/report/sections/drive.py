@@ -64,7 +64,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield the effects of the filter and the variants, and how much masks flicker."""
     effects = findings.facts.final_effects
     if effects:
-        filter_too = "the filter and " * (FILTERED in findings.finals)
+        filter_too = "the filter and " * (FILTERED in findings.facts.finals)
         yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
         yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
@@ -112,7 +112,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
         flicker = measured["flicker"]
         rows.append(
             [
-                variant_cell(name, [*findings.finals]),
+                variant_cell(name, [*findings.facts.finals]),
                 percent(flicker),
                 percent(measured["truth_flicker"]),
                 points(flicker - measured["truth_flicker"]) if defined(flicker) else DASH,
@@ -145,7 +145,7 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     # This region counts cells of ground: it has no share of the pixels.
     in_image = findings.regions.index.unique("region").drop(ABOVE, errors="ignore")
     names = titles([*in_image], findings.height)
-    chart = charts.regions(findings.regions, [*findings.finals], names)
+    chart = charts.regions(findings.regions, [*findings.facts.finals], names)
     yield Figure(chart, caption("regions"))
     shadow = caption("detected shadow") if "shadow" in names else ""
     width = findings.facts.evaluation.boundary_width

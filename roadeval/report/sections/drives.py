@@ -117,7 +117,7 @@ def along(findings: FleetFolder, most: int, beside: Path) -> Iterator[Block]:
         return
     rates = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
     frames = finals(only(findings.table("frames"), variant=focus))
-    top, look = 100 * max(frames[TESTED].max(), 0.01), looks([*findings.finals])[focus]
+    top, look = 100 * max(frames[TESTED].max(), 0.01), looks([*findings.facts.finals])[focus]
     yield Heading(f"Along each drive: {focus}")
     yield note("along drives", variant=focus)
     rows = {drive: part for (drive,), part in group_rows(frames, ["drive"])}

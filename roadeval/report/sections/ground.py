@@ -32,7 +32,7 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     if findings.facts.kitti:
         yield Heading("KITTI's road benchmark")
         yield kitti_table(findings.facts)
-    rows, names = findings.table("metres").to_dict("records"), [*findings.finals]
+    rows, names = findings.table("metres").to_dict("records"), [*findings.facts.finals]
     if not rows:
         return
     yield Heading("On the ground, in metres")

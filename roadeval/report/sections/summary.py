@@ -106,10 +106,10 @@ def warnings(findings: Findings) -> Iterator[str]:
     trained_here = facts.training.model is None or facts.training.adapted
     if facts.training.source == "truth" and trained_here and findings.facts.totals:
         yield caption("trained on this drive")
-    errors = {name: findings.total(name)[TESTED] for name in findings.finals}
+    errors = {name: findings.total(name)[TESTED] for name in findings.facts.finals}
     if worse := _worse_than_baseline(errors):
         yield caption("worse than blind", worse=worse)
-    for variant in findings.finals:
+    for variant in findings.facts.finals:
         total = findings.total(variant)
         if rates := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
             frames, rates_named = number(total["frames"]), listing(rates)
