@@ -268,8 +268,7 @@ class DriveResult:
     def _both(self) -> list[int]:
         """The frames in both tables, of frames and of regions."""
         frames, regions = (self._tables.table(name)["frame"] for name in ("frames", "regions"))
-        both: list[int] = np.intersect1d(frames, regions).tolist()
-        return both
+        return np.intersect1d(frames, regions).tolist()
 
 
 Opened = DriveResult | FleetFolder
