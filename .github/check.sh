@@ -45,11 +45,11 @@ EOF
   what="the comparison ended with exit code $code"
 else
   code=0
-  echo "### roadeval: passed, there is no baseline yet" > .roadeval/comment.md
+  echo "## roadeval: passed, there is no baseline yet" > .roadeval/comment.md
 fi
 # Names in errors are from logs: in a block of code they do nothing.
 [ -e .roadeval/comment.md ] || {
-  printf '### roadeval: failed, %s\n\n' "$what"
+  printf '## roadeval: failed, %s\n\n' "$what"
   tail -n 20 .roadeval/errors.txt | cut -c 1-1000 | sed 's/^/    /'
 } > .roadeval/comment.md
 [ "$code" != 0 ] || [ "${KEEP:-}" != 1 ] || { rm -rf "$base" && cp -R "$new" "$base"; }

@@ -33,10 +33,14 @@ def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
     return Cell(text or name, look=looks(names)[name])
 
 
+def breaks_of(rows: Sequence[Sequence[Cell | str]]) -> list[int]:
+    """Return the rows that begin a part of a table, behind the first: they have a first cell."""
+    return [place for place, row in enumerate(rows) if place and row[0]]
+
+
 def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
     """Yield a cell in percent for each value; the best one is bold."""
-    defined_values = [value for value in values if defined(value)]
-    best = (max if higher else min)(defined_values, default=None)
+    best = (max if higher else min)(filter(defined, values), default=None)
     place = None if best is None else values.index(best)
     yield from (Cell(percent(value), bold=i == place) for i, value in enumerate(values))
 
@@ -84,29 +88,25 @@ def stages_table(
     totals: Totals, changes: Mapping[tuple[str, str], Sequence[float]] | None = None
 ) -> Table:
     """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
-    rows: list[list[Cell | str]] = []
-    breaks = []
-    for variant, stages in totals.items():
-        breaks.append(len(rows))
-        for place, (stage, total) in enumerate(stages.items()):
-            rows.append(
-                [
-                    "" if place else variant_cell(variant, [*totals]),
-                    stage,
-                    number(total["frames"]),
-                    *(percent(total.get(n)) for n in FULL),
-                    *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_UNTABLED)),
-                ]
-            )
-            if changes:
-                rows[-1] += map(percent, changes.get((variant, stage), (None, None)))
+    rows: list[list[Cell | str]] = [
+        [
+            "" if place else variant_cell(variant, [*totals]),
+            stage,
+            number(total["frames"]),
+            *(percent(total.get(n)) for n in FULL),
+            *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_UNTABLED)),
+            *(map(percent, changes.get((variant, stage), (None, None))) if changes else ()),
+        ]
+        for variant, stages in totals.items()
+        for place, (stage, total) in enumerate(stages.items())
+    ]
     changed = ["repaired", "spoiled"] if changes else []
     meanings = "; ".join(f"{name}: {metric.in_words}" for name, metric in SHORT.items())
     return Table(
         ["variant", "stage", "frames", *FULL, "pooled ERR", *SHORT_UNTABLED, *changed],
         rows,
         text_columns=(0, 1),
-        breaks=breaks[1:],
+        breaks=breaks_of(rows),
         caption=f"Percent. {meanings}.",
         small=True,
     )

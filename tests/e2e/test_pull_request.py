@@ -165,7 +165,7 @@ PULL = {"pull_request": {"number": 5}}
 def test_a_repository_has_a_baseline_then_one_comment_that_each_push_updates(check, site):
     first = check("good", {"ref": "refs/heads/main"})
     assert first.returncode == 0, first.stderr
-    assert first.summary.startswith("### roadeval: passed, there is no baseline yet")
+    assert first.summary.startswith("## roadeval: passed, there is no baseline yet")
     assert site.calls == []
     base = check.repository / ".roadeval" / "base"
     kept = (base / "summary.json").stat().st_mtime_ns
@@ -177,7 +177,7 @@ def test_a_repository_has_a_baseline_then_one_comment_that_each_push_updates(che
     (comment,) = site.ours
     title, *_ = comment.splitlines()
     assert re.fullmatch(
-        rf"### roadeval: failed, 1 of 1 limits exceeded: {re.escape(LIMIT)}; .*", title
+        rf"## roadeval: failed, 1 of 1 limits exceeded: {re.escape(LIMIT)}; .*", title
     )
     assert "https://github.example/team/road/actions/runs/7" in comment
     assert comment.endswith(f"{MARK}\n")
@@ -208,7 +208,7 @@ def test_a_replay_that_fails_is_told_in_code_and_ends_the_check(check, site):
     assert re.match(r"::stop-commands::[0-9a-f]{32}\n", done.stdout)
     (comment,) = site.ours
     assert comment.startswith(
-        "### roadeval: failed, the replay ended with exit code 1\n\n    error: @"
+        "## roadeval: failed, the replay ended with exit code 1\n\n    error: @"
     )
     assert "\n    </details> @octocat" in comment
 

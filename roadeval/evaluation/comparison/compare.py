@@ -451,8 +451,7 @@ def by_drive(
 
 def _means(drives: pd.DataFrame, names: Sequence[str]) -> list[float]:
     """Average drives as their differences are, so that these lie between two rates."""
-    means: list[float] = drives.groupby("group")[[*names]].mean().mean().tolist()
-    return means
+    return drives.groupby("group")[[*names]].mean().mean().tolist()
 
 
 def _difference(

@@ -32,9 +32,8 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
 from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
-from roadeval.fleet.remote import local_path
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.results.result import Result
+from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
 from roadeval.report.writing import write_document
 from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
@@ -141,7 +140,7 @@ def find_results(path: Path) -> list[Path]:
 
     Recordings count only if there is no folder of results. A `RoadevalError` if there is none.
     """
-    if path.is_file() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
+    if not path.is_dir() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
         return [path]
     folders, recordings = [], []
     for folder, below, files in os.walk(path):

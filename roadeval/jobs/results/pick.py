@@ -165,8 +165,7 @@ def _share_out(sizes: Sequence[int], count: int) -> list[int]:
     exact = np.array(sizes) * count / max(sum(sizes), 1)
     shares = np.floor(exact).astype(int)
     shares[np.argsort(shares - exact, kind="stable")[: count - shares.sum()]] += 1
-    frames: list[int] = shares.tolist()
-    return frames
+    return shares.tolist()
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,10 @@ function svg(name, attributes, text = "") {
   return made;
 }
 
-/** The position in rising numbers that is nearest to a value. */
+/** The position in numbers that is nearest to a value. */
 function nearest(numbers, value) {
-  let [low, high] = [0, numbers.length - 1];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (numbers[middle] < value) low = middle;
-    else high = middle;
-  }
-  return Math.abs(numbers[low] - value) <= Math.abs(numbers[high] - value) ? low : high;
+  const far = (place) => Math.abs(numbers[place] - value);
+  return numbers.reduce((best, _, place) => (far(place) < far(best) ? place : best), 0);
 }
 
 /** About so many round numbers in a range, at least so far from each other. */
@@ -56,6 +51,7 @@ class ChartView {
   constructor(element, onFrame) {
     this.element = element;
     this.values = JSON.parse(element.dataset.values);
+    this.numbers = [...new Set(this.values.series.flatMap((series) => series.x))].sort((a, b) => a - b);
     this.area = element.querySelector(".area");
     [this.low, this.high] = this.values.x;
     this.cursor = svg("path", { class: "cursor" });
@@ -103,22 +99,14 @@ class ChartView {
   key(event, onFrame) {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (step && this.values.frames && this.element.classList.contains("low")) return; // The page goes to the next frame.
-    const numbers = this.numbers();
+    const { numbers } = this;
     const place = this.pointed === undefined ? 0 : nearest(numbers, this.pointed);
-    if (step) {
-      const next = Math.min(Math.max(place + step, 0), numbers.length - 1);
-      pointAt(this, numbers[next]);
-    } else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
+    if (step) pointAt(this, numbers[Math.min(Math.max(place + step, 0), numbers.length - 1)]);
+    else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
     else if (event.key === "Escape" && this.values.frames) zoom(...range.drive);
     else return;
     event.preventDefault();
     event.stopPropagation();
-  }
-
-  /** All positions that have a value, in order. */
-  numbers() {
-    this.positions ??= [...new Set(this.values.series.flatMap((series) => series.x))].sort((a, b) => a - b);
-    return this.positions;
   }
 
   /** The place of a position, in percent of the chart. */
@@ -134,8 +122,7 @@ class ChartView {
   }
 
   snapped(x) {
-    const numbers = this.numbers();
-    return numbers.length ? numbers[nearest(numbers, x)] : x;
+    return this.numbers[nearest(this.numbers, x)] ?? x;
   }
 
   point(x) {

@@ -30,18 +30,13 @@ class Browser {
     this.tools();
     this.filters();
     this.threshold();
-    for (const row of this.rows) {
-      row.addEventListener("click", (event) => {
-        event.preventDefault();
-        this.show(Number(row.dataset.frame));
-      });
-    }
-    for (const link of document.querySelectorAll('a[href^="#frame-"]:not(.frames a)')) {
-      link.addEventListener("click", (event) => {
-        event.preventDefault();
-        this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
-      });
-    }
+    document.addEventListener("click", (event) => {
+      const [row, link] = [".frames tbody tr", 'a[href^="#frame-"]'].map((part) => event.target.closest(part));
+      if (!row && !link) return;
+      event.preventDefault();
+      if (row) this.show(Number(row.dataset.frame));
+      else this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
+    });
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
     range.frames = this.data.frames;
     range.onChange.push(() => this.narrow());
@@ -66,10 +61,8 @@ class Browser {
 
   tools() {
     const tools = this.element.querySelector(".tools");
-    this.where = tools.querySelector(".where");
-    this.previous = tools.querySelector(".previous");
-    this.next = tools.querySelector(".next");
-    this.playButton = tools.querySelector(".play");
+    const names = [".where", ".previous", ".next", ".play"];
+    [this.where, this.previous, this.next, this.playButton] = names.map((name) => tools.querySelector(name));
     tools.hidden = false;
     this.previous.addEventListener("click", () => this.step(-1));
     this.next.addEventListener("click", () => this.step(1));
@@ -88,7 +81,7 @@ class Browser {
   /** The frames to step through: those of the film, without one those with pictures; within the chosen part. */
   shown() {
     const all = this.film ? this.film.frames : [...this.held.keys()].sort((a, b) => a - b);
-    const inside = all.filter((frame) => isInRange(frame));
+    const inside = all.filter(isInRange);
     return inside.length ? inside : all;
   }
 
@@ -101,15 +94,13 @@ class Browser {
   /** Play from this frame, from the first one if this is the last; or stop. */
   toggle() {
     const [frames, button] = [this.shown(), this.playButton];
-    if (this.film.playing) this.film.pause();
-    else {
-      if (this.frame >= frames.at(-1)) this.show(frames[0]);
-      button.textContent = "Pause";
-      this.film.play(frames.at(-1), () => {
-        button.textContent = "Play";
-        this.show(this.frame, { address: "replaceState" });
-      });
-    }
+    if (this.film.playing) return this.film.pause();
+    if (this.frame >= frames.at(-1)) this.show(frames[0]);
+    button.textContent = "Pause";
+    this.film.play(frames.at(-1), () => {
+      button.textContent = "Play";
+      this.show(this.frame, { address: "replaceState" });
+    });
   }
 
   /** Show a frame; the address names it, as a new step of the history or in place of the last step. */
@@ -217,7 +208,7 @@ class Browser {
   judge() {
     const { words, counts, frames, verdicts } = this.data;
     const countsIn = (name) => counts[name].filter((frame, place) => frame && isInRange(frames[place]));
-    const [inside, ofFocus] = [frames.filter((frame) => isInRange(frame)), counts[choice.focus]];
+    const [inside, ofFocus] = [frames.filter(isInRange), counts[choice.focus]];
     const rates = (name) => Object.fromEntries(["ERR", "FNR", "FPR"].map((rate) => [rate, percent(meanRate(rate, countsIn(name)), 1)]));
     this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus]?.replaceAll("`", "") ?? this.verdictOfDrive);
     if (isPart() && ofFocus) {
@@ -231,10 +222,6 @@ class Browser {
     if (link && worst !== undefined) {
       link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(this.errorOf(worst), 1) });
       link.hash = `#frame-${worst}`;
-      link.onclick = (event) => {
-        event.preventDefault();
-        this.show(worst, { scroll: true });
-      };
       const command = document.querySelector("#summary .links code");
       if (command) command.textContent = this.element.dataset.command.replace("{}", worst);
     }
@@ -260,8 +247,7 @@ class Browser {
     this.thresholdBox.hidden = !slider;
     if (!slider) return;
     if (this.film) {
-      if (level === undefined) delete this.film.levels[choice.focus];
-      else this.film.levels[choice.focus] = level;
+      this.film.levels[choice.focus] = level;
       this.stage.draw();
     }
     // A level holds 256 of the 65536 codes of a probability; road are the pixels above a code.
@@ -289,12 +275,8 @@ class Browser {
     form.hidden = false;
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("input", () => this.filter());
-    form.addEventListener("reset", () => {
-      setTimeout(() => {
-        if (range.drive) zoom(...range.drive);
-        else this.filter();
-      });
-    });
+    const clear = () => (range.drive ? zoom(...range.drive) : this.filter());
+    form.addEventListener("reset", () => setTimeout(clear));
   }
 
   filter() {

@@ -33,10 +33,8 @@ class Stage {
     this.film = film;
     this.home = element.parentElement;
     this.next = element.nextElementSibling;
-    this.above = element.querySelector(".above");
-    this.below = element.querySelector(".below");
-    this.edge = element.querySelector(".edge");
-    this.slider = element.querySelector("input");
+    const parts = [".above", ".below", ".edge", "input"].map((name) => element.querySelector(name));
+    [this.above, this.below, this.edge, this.slider] = parts;
     this.selects = [element.querySelector(".left"), element.querySelector(".right")];
     this.slider.addEventListener("input", () => this.slide());
     for (const select of this.selects) {

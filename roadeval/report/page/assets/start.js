@@ -53,7 +53,7 @@ followOutline();
 /** The frame of the table that is nearest to a number. */
 function nearestFrame(frame) {
   const frames = browser.shown();
-  return frames.length ? frames[nearest(frames, frame)] : frame;
+  return frames[nearest(frames, frame)] ?? frame;
 }
 
 for (const image of document.querySelectorAll(".grid img")) {
