@@ -116,10 +116,7 @@ def write_figures(
 
     def write(named_svg: tuple[str, bytes]) -> list[Path]:
         name, svg = named_svg
-        files = {folder / f"{name}.{kind}": _content(svg, kind) for kind in kinds}
-        for path, content in files.items():
-            write_file(path, content)
-        return list(files)
+        return [write_file(folder / f"{name}.{kind}", _content(svg, kind)) for kind in kinds]
 
     # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
     # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.

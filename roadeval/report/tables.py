@@ -6,17 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
-from roadeval.data.words import (
-    DASH,
-    MINUS,
-    defined,
-    in_percent,
-    listing,
-    number,
-    percent,
-    points,
-    short_names,
-)
+from roadeval.data import words
+from roadeval.data.words import DASH, MINUS, defined, in_percent, number, percent, points
 from roadeval.evaluation.metrics import FULL, METRICS, SHORT, SHORT_UNTABLED, TESTED, UNTABLED
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.captions import caption
@@ -67,7 +58,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         sentences = [caption("rates of a fleet")]
     else:
         frames = counts[0] if alike else "the evaluated"
-        sentences = [caption("rates", frames=frames, untabled=listing([*UNTABLED]))]
+        sentences = [caption("rates", frames=frames, untabled=words.listing([*UNTABLED]))]
         if widths := {measured["width"] for measured in facts.beyond.values()}:
             for name in ("boundary_F", "boundary_IoU"):
                 values = [facts.beyond.get(variant, {}).get(name) for variant in finals]
@@ -123,14 +114,14 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
     unit = effects[0].rates[TESTED].unit
     rows: list[list[Cell | str]] = []
     for effect in effects:
-        change, words = effect.rates[TESTED], f"{effect.variant} {MINUS} {effect.base}"
+        change, title = effect.rates[TESTED], f"{effect.variant} {MINUS} {effect.base}"
         ends = [percent(errors[name]) for name in (effect.base, effect.variant)]
         won = [number(count or 0) for count in (change.better, change.worse)]
         if unit == "frames":
             won.append(DASH if change.effective is None else f"{change.effective:.0f}")
         rows.append(
             [
-                variant_cell(effect.variant, names, words),
+                variant_cell(effect.variant, names, title),
                 *([] if brief else ends),
                 points(change.mean),
                 marked_interval(change),
@@ -177,7 +168,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
 
 def cameras_table(facts: Facts) -> Table:
     """Tabulate ERR of each camera's final masks, and the first difference within each camera."""
-    names, masks = short_names([*facts.cameras]), [*facts.finals]
+    names, masks = words.short_names([*facts.cameras]), [*facts.finals]
     pairs = [(effect.variant, effect.base) for effect in facts.final_effects[:1]]
     rows: list[list[Cell | str]] = []
     for camera, of_camera in facts.cameras.items():

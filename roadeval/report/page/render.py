@@ -19,16 +19,7 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from roadeval.data.words import MINUS
-from roadeval.report.blocks import (
-    Block,
-    Cell,
-    Heading,
-    ImageFile,
-    KeepTogether,
-    Report,
-    Table,
-    plain,
-)
+from roadeval.report.blocks import Block, Cell, Heading, ImageFile, KeepTogether, Report, Table
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import place_chart, range_of_frames, values
@@ -104,7 +95,7 @@ def _hash(code: str) -> str:
 
 def _variant_of(variants: Sequence[str], text: Cell | str) -> str:
     """Return the variant that a text begins with, as "a", "a: its mask" or a difference from a."""
-    words = plain(text)
+    words = text if isinstance(text, str) else text.text
     names = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
     return next(names, "")
 

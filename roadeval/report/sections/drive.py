@@ -107,22 +107,21 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     }
     if not measures:
         return
-    rows: list[list[Cell | str]] = []
-    for name, measured in measures.items():
-        flicker = measured["flicker"]
-        rows.append(
-            [
-                variant_cell(name, [*findings.facts.finals]),
-                percent(flicker),
-                percent(measured["truth_flicker"]),
-                points(flicker - measured["truth_flicker"]) if defined(flicker) else DASH,
-                *(number(measured[count]) for count in ("pairs", "episodes")),
-                *(f"{measured[time]:.1f}" for time in ("seconds", "longest")),
-                percent(measured["share"]),
-                number(measured["recovered"]),
-                f"{measured['recovery']:.1f}" if measured["recovered"] else DASH,
-            ]
-        )
+    rows: list[list[Cell | str]] = [
+        [
+            variant_cell(name, [*findings.facts.finals]),
+            *(percent(measured[rate]) for rate in ("flicker", "truth_flicker")),
+            points(measured["flicker"] - measured["truth_flicker"])
+            if defined(measured["flicker"])
+            else DASH,
+            *(number(measured[count]) for count in ("pairs", "episodes")),
+            *(f"{measured[time]:.1f}" for time in ("seconds", "longest")),
+            percent(measured["share"]),
+            number(measured["recovered"]),
+            f"{measured['recovery']:.1f}" if measured["recovered"] else DASH,
+        ]
+        for name, measured in measures.items()
+    ]
     table = Table(
         [
             *("final mask", "flicker, %", "the truth's, %", "beyond it", "pairs"),
