@@ -163,11 +163,6 @@ class FleetRun:
         progress = Progress(len(done), len(self.entries), stage, "", "drives", ", ".join(detail))
         self.on_progress(progress)
 
-    def _task(
-        self, entry: DriveEntry, config: RunConfig, model: str, fold: int | None
-    ) -> DriveTask:
-        return DriveTask(self.folder, entry, config, software(config), model, fold)
-
     def _by_model(self) -> Iterator[DriveTask]:
         """Yield the tasks of drives that one model scores, or that train their own."""
         digest, model = "", self.config.training.model
@@ -175,7 +170,8 @@ class FleetRun:
             with reading(model, FleetError, "cannot read the model"):
                 digest = sha256_of(Path(model))
         for entry in self.entries:
-            yield self._task(entry, entry.config(self.config), digest, None)
+            config = entry.config(self.config)
+            yield DriveTask(self.folder, entry, config, software(config), digest)
 
     def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
@@ -224,7 +220,8 @@ class FleetRun:
             config = configs[entry.id].override(
                 {"training": {"model": str(training[fold.fold].path)}}
             )
-            task = self._task(entry, config, fold.sha256, fold.fold)
+            how = software(config), fold.sha256, fold.fold
+            task = DriveTask(self.folder, entry, config, *how)
             if fold.problem:
                 self._fail(task, fold.problem)
             else:
