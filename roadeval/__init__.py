@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.results.audit import audit
     from roadeval.jobs.results.clip import clip
     from roadeval.jobs.results.compare import compare
+    from roadeval.jobs.results.history import history
     from roadeval.jobs.results.pick import pick
     from roadeval.jobs.results.report import write_figures, write_report
     from roadeval.jobs.results.result import Result
@@ -56,6 +57,7 @@ __all__ = [
     "config_toml",
     "configure",
     "demo",
+    "history",
     "info",
     "load_config",
     "load_model",
@@ -78,6 +80,7 @@ _MODULES: Final = {
     "jobs.results.audit": ("audit",),
     "jobs.results.clip": ("clip",),
     "jobs.results.compare": ("compare",),
+    "jobs.results.history": ("history",),
     "jobs.results.pick": ("pick",),
     "jobs.results.report": ("write_figures", "write_report"),
     "jobs.results.result": ("Result",),

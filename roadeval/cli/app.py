@@ -21,7 +21,7 @@ from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.text import debug, defect, likely
 
 FIRST: Final = (
-    *("replay", "fleet", "report", "inspect", "clip", "compare"),
+    *("replay", "fleet", "report", "inspect", "clip", "compare", "history"),
     *("pick", "audit", "info", "train", "config", "pack", "demo"),
 )
 """The order of the commands in the help; others follow by name."""

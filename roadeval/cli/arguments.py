@@ -29,7 +29,7 @@ def argument(metavar: str, text: str) -> Any:
 
 
 Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
-Result = Annotated[Path, argument("RESULT", "A recording (.rrd), or a results folder.")]
+Result = Annotated[str, argument("RESULT", "A recording, a results folder, a fleet, or a URL.")]
 LabelFormat = Annotated[
     Literal["png", "coco"], option("--format", "Format of the labels to correct.")
 ]
@@ -197,7 +197,7 @@ def check_one_camera(options: OptionValues) -> None:
 
 
 def _check_names(options: OptionValues) -> None:
-    """Raise a `ConfigError` if two variants have one name, or a name cannot be used."""
+    """Raise a `RoadevalError` if two variants or labels have one name, or a name cannot be used."""
     from roadeval.config.variants import check_variant_name
     from roadeval.data import FILTERED, UNFILTERED
 
@@ -206,6 +206,9 @@ def _check_names(options: OptionValues) -> None:
         for name, _ in options.get(option, ()):
             check_variant_name(name, taken)
             taken.append(name)
+    labels = [name for name, _ in options.get("output.labels", ())]
+    if len({*labels}) < len(labels):
+        raise RoadevalError("two have one name", setting="output.labels")
 
 
 def _tables(options: OptionValues) -> dict[str, Any]:
@@ -214,7 +217,7 @@ def _tables(options: OptionValues) -> dict[str, Any]:
     for setting, value in options.items():
         table, _, key = setting.partition(".")
         if key:
-            tables.setdefault(table, {})[key] = dict(value) if key == "masks" else value
+            tables.setdefault(table, {})[key] = dict(value) if key in ("masks", "labels") else value
     topics = options.get("cameras", ())
     if len(topics) > 1:
         tables["cameras"] = [{"image": topic} for topic in topics]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Final
 
 from roadeval import kernels
 from roadeval.cli import console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
 from roadeval.runtime.text import debug, visible, visible_lines, without_secrets
+
+if TYPE_CHECKING:
+    from roadeval.evaluation.comparison.conditions import Judgement
 
 PROGRAM: Final = "roadeval"
 
@@ -22,9 +25,10 @@ def error(sentence: str, draft: str = "") -> None:
         sys.stderr.write(f"\n{visible_lines(draft)}\n")
 
 
-def warning(sentence: str) -> None:
-    """Write a warning: ``roadeval: warning: ...``."""
-    _write("warning", "bold yellow", sentence)
+def warning(*sentences: str) -> None:
+    """Write warnings: ``roadeval: warning: ...``."""
+    for sentence in sentences:
+        _write("warning", "bold yellow", sentence)
 
 
 def note(sentence: str) -> None:
@@ -39,15 +43,17 @@ def losses(sentences: Sequence[str]) -> ExitCode:
     return ExitCode.LOSS if sentences else ExitCode.DONE
 
 
-def conditions(held: Sequence[str], unjudged: Sequence[str]) -> ExitCode:
+def conditions(judgements: Iterable[Judgement]) -> ExitCode:
     """Write which conditions hold and which could not be judged; return the exit code."""
-    for sentence in held:
-        error(f"limit exceeded: {sentence}")
-    for sentence in unjudged:
-        error(sentence)
-    if held:
-        return ExitCode.CONDITION_HELD
-    return ExitCode.FAILED if unjudged else ExitCode.DONE
+    from roadeval.results.comparison import describe_judgement
+
+    codes = [ExitCode.DONE]
+    for judgement in judgements:
+        if judgement.holds is not False:
+            exceeded = "limit exceeded: " if judgement.holds else ""
+            error(f"{exceeded}{describe_judgement(judgement)}")
+            codes.append(ExitCode.CONDITION_HELD if judgement.holds else ExitCode.FAILED)
+    return max(codes)
 
 
 def traceback(text: str) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from roadeval.runtime.settings import Flag
+from roadeval.runtime.settings import Checked, Flag
 
 SECTIONS: Final = (
     *("topics", "truth", "labels", "frames", "ground", "training", "evaluation", "output"),
@@ -15,6 +16,16 @@ SECTIONS: Final = (
 )
 """The tables that apply to all variants; `roadeval.config.run.RunConfig` has fields of their names.
 """
+
+
+def _labels(labels: object) -> object:
+    """Return labels of results, whose names are plain, and whose values are a line of text."""
+    from roadeval.data import is_plain
+
+    for name, text in labels.items() if isinstance(labels, Mapping) else ():
+        if not is_plain(name) or not 0 < len(str(text)) <= 500 or not str(text).isprintable():
+            raise ValueError("must be of letters, digits, - and _, and after = a line of up to 500")
+    return labels
 
 
 @dataclass(frozen=True)
@@ -30,6 +41,7 @@ class OutputSettings:
         those of every N-th frame. ``none`` makes no recording.
     focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
         that you bring, else ``filtered``.
+    labels: Label of the results, as branch=main, which changes no number.
     figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
     """
 
@@ -38,6 +50,9 @@ class OutputSettings:
     mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
     record: Annotated[str, Flag("--record", "WHAT")] = "all"
     focus: Annotated[str | None, Flag("--focus", "NAME", "Methods")] = None
+    labels: Annotated[Mapping[str, str], Checked(_labels), Flag("--label", "NAME=VALUE")] = field(
+        default_factory=dict
+    )
     figures: bool = True
 
 

@@ -236,8 +236,7 @@ def _reduce(array: Array) -> Array:
     height, width = array.shape[:2]
     block = max(2, -(-width // COLUMNS))
     size = -(-width // block), -(-height // block)
-    small: Array = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
-    return small
+    return cv2.resize(array, size, interpolation=cv2.INTER_AREA)
 
 
 def _jpeg(rgb: Array) -> bytes:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import groupby, pairwise
+from operator import attrgetter
 from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
@@ -33,6 +34,7 @@ from roadeval.report.blocks import (
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart
 from roadeval.report.charts import standard as charts
+from roadeval.report.comment import MOST, changes, fit, in_code, levels, standing
 from roadeval.results import comparison as sentences
 from roadeval.results.sentences import correction, marked_interval
 
@@ -46,6 +48,7 @@ NAMED: Final = 20
 CHANGE: Final = ("base %", "new %", "change", "interval")
 """The titles of a change's columns."""
 _COMMAND: Final = "in the viewer"
+_MASK: Final = attrgetter("result", "variant")
 _WORDS: Final = ("result", "variant", "stage", "rate", "drive", "region", "stamp", "class")
 """The columns of words, beside the commands."""
 
@@ -89,6 +92,46 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     return f"# {title}\n\n{blocks_as_markdown(blocks)}"
 
 
+def comment(
+    comparison: Comparison, judgements: Sequence[Judgement], over: Sequence[Chart], command: str
+) -> str:
+    """Return a comparison as Markdown for one comment; ``command`` repeats it."""
+    mask, text, head = standing(comparison, judgements)
+    if judgements:
+        failed = [limit.condition.text for limit in judgements if limit.holds is not False]
+        head = ": ".join([sentences.headline([j.holds for j in judgements]), *failed[:1]])
+    chief = replace(comparison, changes=tuple(comparison.finals()))
+    for kind in ("drives", "regions", "moved"):
+        rows: Any = tuple(row for row in getattr(chief, kind) if _MASK(row) == _MASK(mask))
+        chief = replace(chief, **{kind: rows})
+    first = [Heading(f"roadeval: {head}; ERR of {text}"), *overview(chief, judgements, 10)]
+    texts = [*map(fit, (first, changed_drives(chief, 10), _warnings(comparison)))]
+    texts += [*_pictures(chief, mask, over), f"Again: {in_code(command)}\n"]
+    rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
+    for title, part in rest.items():
+        inside = fit(part, MOST - len("\n".join(texts).encode()) - 200)
+        texts.append(f"<details><summary>{title}</summary>\n\n{inside}\n</details>\n")
+    return "\n".join(text for text in texts if text.strip())
+
+
+def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> list[str]:
+    """Return charts of a mask's ERR, each below a sentence on what it shows."""
+    base, name = chief.results[0].label, mask.variant
+    lines = {line.name: line.y for chart in over for line in chart.series}
+    old = lines.get(base if name == mask.result else f"{base}: {name}", [])
+    pairs = [*zip(old, lines.get(mask.name, []), strict=False)]
+    pairs = pairs or sorted(((100 * d.base, 100 * d.new) for d in chief.drives), reverse=True)
+    where = "over the drive" if old else "drive by drive"
+    drawn = {f"ERR of {name}, {where}: bars are {base}, the line is {mask.result}.": levels(pairs)}
+    for unit, rows in {
+        "region": [(row.title, row.difference.mean) for row in chief.regions],
+        "drive": [(row.drive, row.difference.mean) for row in chief.drives],
+        "frame": [(f"frame {row.frame}", row.change) for row in chief.moved],
+    }.items():
+        drawn[f"Change of {name} by {unit}: orange is worse, blue is better."] = changes(rows)
+    return [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
+
+
 def _subtitle(result: ComparedResult) -> str:
     """Return the frames or drives of a result in words."""
     if result.drive is not None:
@@ -108,14 +151,7 @@ def overview(
 
     ``judgements`` judge the limits of the command; at most ``most`` changed settings are named.
     """
-    for title, kind, tone in (
-        ("Limits exceeded", True, "warning"),
-        ("Not judged", None, "warning"),
-        ("Limits kept", False, "plain"),
-    ):
-        limits = [limit for limit in judgements if limit.holds is kind]
-        if lines := [sentences.describe_judgement(limit) for limit in limits]:
-            yield BulletList(title, lines, tone)
+    yield from limits(judgements)
     yield Text(sentences.verdict(comparison), "verdict")
     yield from (Text(line) for line in sentences.changed_settings(comparison, most))
     yield from _changes(comparison)
@@ -123,23 +159,37 @@ def overview(
         yield BulletList("Where", where)
 
 
+def limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
+    """Yield the judged limits of a command: those exceeded, not judged, and kept."""
+    for title, kind, tone in (
+        ("Limits exceeded", True, "warning"),
+        ("Not judged", None, "warning"),
+        ("Limits kept", False, "plain"),
+    ):
+        alike = [limit for limit in judgements if limit.holds is kind]
+        if lines := [sentences.describe_judgement(limit) for limit in alike]:
+            yield BulletList(title, lines, tone)
+
+
 def _changes(comparison: Comparison) -> Iterator[Block]:
     """Yield a table of each result: ERR of each stage, and every rate of final masks."""
     base = comparison.results[0].label
     alone = all(row.result == row.variant for row in comparison.changes)
-    for result, rows in _by(_changed(comparison), lambda row: "" if alone else row.result):
+    changed = _changed(comparison)
+    for result, group in groupby(changed, lambda row: "" if alone else row.result):
+        rows = [*group]
         drives = max(row.drives for row in rows)
         over = f": {drives} drives in common" if drives > 1 else ""
         lines: list[list[Cell | str]] = []
         breaks = []
-        for variant, of_variant in _by(rows, lambda row: row.variant):
+        for variant, of_variant in groupby(rows, attrgetter("variant")):
             breaks.append(len(lines))
-            for row in of_variant:
+            for place, row in enumerate(of_variant):
                 for rate in SHORT if row.final else [TESTED]:
                     first, change = rate == TESTED, row.difference[rate]
                     lines.append(
                         [
-                            variant if first and row is of_variant[0] else "",
+                            variant if first and place == 0 else "",
                             row.stage if first else "",
                             rate,
                             percent(row.base[rate]),
@@ -166,12 +216,6 @@ def _changed(comparison: Comparison) -> list[MaskChange]:
     """Return the changes to show, without the variants of which no stage changed."""
     names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
     return [row for row in comparison.changes if (row.result, row.variant) in names]
-
-
-def _by(
-    rows: Sequence[MaskChange], key: Callable[[MaskChange], str]
-) -> list[tuple[str, list[MaskChange]]]:
-    return [(name, [*group]) for name, group in groupby(rows, key)]
 
 
 def _table(rows: Sequence[Row], columns: Columns, legend: str = "") -> Table:
@@ -248,11 +292,11 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
         yield _table(comparison.moved, columns)
 
 
-def changed_drives(comparison: Comparison) -> Iterator[Block]:
+def changed_drives(comparison: Comparison, most: int = NAMED) -> Iterator[Block]:
     """Yield a table for each mask of the drives that changed, the surest first."""
-    for (result, variant), changes in _by_mask(comparison).items():
-        if rows := [row for row in changes if row.changed]:
-            shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
+    for (result, variant), drives in groupby(comparison.drives, _MASK):
+        if rows := [row for row in drives if row.changed]:
+            shown = f" ({most} of {len(rows)})" if len(rows) > most else ""
             of = f" of {result}" if len(comparison.results) > 2 else ""
             title = f"{variant}{of} changed"
             if result == variant:  # variants of one result
@@ -266,7 +310,7 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
                     DASH if row.q is None else "<0.001" if row.q < 0.001 else f"{row.q:.3f}"
                 ),
             }
-            yield _table(rows[:NAMED], columns)
+            yield _table(rows[:most], columns)
 
 
 def _change(ends: Callable[[Any], str]) -> Columns:
@@ -280,25 +324,14 @@ def _change(ends: Callable[[Any], str]) -> Columns:
     return dict(zip(CHANGE, cells, strict=True))
 
 
-def _by_mask(comparison: Comparison) -> dict[tuple[str, str], list[DriveChange]]:
-    masks: dict[tuple[str, str], list[DriveChange]] = {}
-    for row in comparison.drives:
-        masks.setdefault((row.result, row.variant), []).append(row)
-    return masks
-
-
 def _plot(comparison: Comparison) -> Iterator[Block]:
     """Yield the change of the first mask on every drive."""
     import pandas as pd
 
-    (result, variant), changes = next(iter(_by_mask(comparison).items()))
-    drives = [(row.drive, asdict(row.difference)) for row in changes if row.difference.units]
+    mask, group = next(groupby(comparison.drives, _MASK))
+    drives = [(row.drive, asdict(row.difference)) for row in group if row.difference.units]
     if drives:
         rows = pd.DataFrame([{"name": name, "group": "", **change} for name, change in drives])
-        mask = result, variant, changes[0].stage
-        (over,) = (
-            row.difference[TESTED]
-            for row in comparison.changes
-            if (row.result, row.variant, row.stage) == mask
-        )
-        yield charts.forest(rows, over, f"change of {TESTED} of {variant}")
+        final = next(row for row in comparison.changes if row.final and _MASK(row) == mask)
+        over = final.difference[TESTED]
+        yield charts.forest(rows, over, f"change of {TESTED} of {final.variant}")

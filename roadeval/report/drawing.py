@@ -191,7 +191,10 @@ def _positions(chart: Chart, frames: AxisRange | None) -> tuple[AxisRange, list[
         x = x if chart.low else _with_room(x)
         return x, _number_ticks(x)
     x = AxisRange(-0.3, len(chart.names) - 0.7)
-    return x, [(x.percent(position), name) for position, name in enumerate(chart.names)]
+    # Many names, as those of runs, do not fit beside each other.
+    step = -(-len(chart.names) // 3) if len(chart.names) > _X_TICKS else 1
+    shown = range(0, len(chart.names), step)
+    return x, [(x.percent(position), chart.names[position]) for position in shown]
 
 
 def _range_of_values(chart: Chart) -> AxisRange:

@@ -31,11 +31,12 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         "where": where(comparison),
         **asdict(comparison),
         "false_discovery_rate": FALSE,
-        "conditions": [*map(_condition, judgements)],
+        "conditions": [*map(condition_of, judgements)],
     }
 
 
-def _condition(judgement: Judgement) -> dict[str, Any]:
+def condition_of(judgement: Judgement) -> dict[str, Any]:
+    """Return a judged condition as a JSON file has it."""
     facts = {name: value for name, value in vars(judgement).items() if name != "why"}
     return {**vars(facts.pop("condition")), **facts, "sentence": describe_judgement(judgement)}
 

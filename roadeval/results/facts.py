@@ -36,6 +36,8 @@ from roadeval.runtime.text import elide, visible, visible_lines
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; it is written last."""
+FETCHED: Final[dict[Path, str]] = {}
+"""Public URLs of results that were fetched, by their paths."""
 
 
 def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
@@ -169,6 +171,20 @@ class Reason:
         word = "frames" if len(self.frames) > 1 else "frame"
         numbers = f"; see {word} {', '.join(map(str, self.frames))}" if self.frames else ""
         return f"{self.sentence.removesuffix('.')}{numbers}."
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The origin of a result, by which many of them are put in order."""
+
+    made_ns: int | None = None
+    """End of the run, in Unix nanoseconds."""
+    commit: str = ""
+    """Git's commit of the repository in which the command ran; empty without one."""
+    dirty: bool = False
+    """Whether tracked files differed from it."""
+    labels: dict[str, str] = field(default_factory=dict)
+    """The labels that ``--label`` gave it."""
 
 
 class FactsFile:
@@ -344,6 +360,8 @@ class Facts(FactsFile):
     """The files of the results folder; a recording has none."""
     cameras: dict[str, Facts] = field(default_factory=dict)
     """The facts of each camera of a rig, by its name."""
+    origin: Origin | None = None
+    """None in a recording, which says nothing of its time, and in older results."""
 
     FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
     AGAIN = "make it again with roadeval replay"
@@ -356,7 +374,16 @@ class Facts(FactsFile):
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "methods", "masks", "files", "kitti"),
-        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why"),
+        *(
+            "cameras",
+            "unlabelled",
+            "estimate",
+            "misfits",
+            "disturbances",
+            "slices",
+            "why",
+            "origin",
+        ),
     )
 
     def content(self) -> dict[str, Any]:
@@ -467,6 +494,8 @@ class FleetFacts(FactsFile):
     """As in `Facts`."""
     slices: dict[str, list[Slice]] = field(default_factory=dict)
     """As in `Facts`, over groups of drives."""
+    origin: Origin | None = None
+    """That of the last run; None in older results."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN
@@ -476,7 +505,7 @@ class FleetFacts(FactsFile):
         "slices",
         "why",
     )
-    OPTIONAL = ("misfits", "disturbances", "slices", "why")
+    OPTIONAL = ("misfits", "disturbances", "slices", "why", "origin")
 
 
 def is_fleet(path: str | Path) -> bool:

@@ -36,10 +36,11 @@ from roadeval.results.facts import (
     FactsFile,
     FleetFacts,
     Member,
+    Origin,
     check_format,
     is_fleet,
 )
-from roadeval.results.folder import ResultsFolder
+from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.over_drives import summarise
 from roadeval.results.rows import (
     Key,
@@ -67,8 +68,9 @@ from roadeval.runtime.text import is_utf8, visible
 if TYPE_CHECKING:
     import pandas as pd
 
-RUN: Final = "run.toml"
-FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in OF_DRIVES))
+WRITTEN: Final = (*OF_DRIVES, "classes")
+"""The tables of all drives in one file; older fleets have no ``classes``."""
+FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
 """The files of a fleet's folder; beside them lie folders with the files of its drives."""
 RESULTS: Final = "results"
 PICTURES: Final = "pictures"
@@ -189,12 +191,17 @@ class FleetFolder:
         `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
         of final masks.
         """
-        if name in OF_DRIVES:
+        if name in OF_DRIVES or (self.has_classes and name == "classes"):
             rows = read_parquet([self.path / f"{name}.parquet"], name)
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]
         return table_of_drives(self.path, name, chosen)
+
+    @property
+    def has_classes(self) -> bool:
+        """Whether ``classes`` of all drives is one file."""
+        return (self.path / "classes.parquet").is_file()
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -212,11 +219,6 @@ class FleetFolder:
         names = dict(self.drives["name"])
         times = Counter(names.values())
         return {drive: name if times[name] == 1 else drive for drive, name in names.items()}
-
-    @property
-    def finals(self) -> dict[str, str]:
-        """Each scored variant's final stage."""
-        return self.facts.finals
 
     @cached_property
     def scores(self) -> pd.DataFrame:
@@ -387,6 +389,7 @@ class FleetWriter:
         run_toml: str,
         *,
         asked: Mapping[str, str] | None = None,
+        origin: Origin | None = None,
     ) -> FleetFacts:
         """Write the tables of all drives and the facts that follow from them.
 
@@ -403,6 +406,7 @@ class FleetWriter:
             read = partial(table_of_drives, self.folder)
             given = finals, members, settings, dict(run), within
             facts = summarise(*given, disturbances=disturbed, read=read)
+            facts = replace(facts, origin=origin)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())
         return facts
@@ -430,7 +434,8 @@ class FleetWriter:
         made["drives"] = table_of("drives", rows["drives"], tags)
         made["effects"] = table_of("effects", rows["effects"])
         made["worst"] = rank_worst(made["worst"])
-        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in OF_DRIVES})
+        made["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
+        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in WRITTEN})
         finals = {
             "drives": made["drives"],
             "scores": only(made["scores"], final=True, region=ALL),

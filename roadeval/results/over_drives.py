@@ -87,9 +87,6 @@ def summarise(
         run=run,
         misfits=[*_misfits(rows)],
         disturbances=_degradations(disturbances or {}, groups, settings.confidence),
-        slices={}
-        if read is None
-        else slices_over_drives(read, drives, groups, settings.confidence),
     )
     facts = replace(facts, verdict=verdict_on(facts))
     if read is None:
@@ -170,11 +167,8 @@ def _totals(scores: pd.DataFrame) -> Totals:
     means = by_mask[[*METRICS]].mean().join(rates_of(sums, METRICS, "pooled_"))
     means.insert(0, "drives", by_mask.size())
     means.insert(1, "frames", sums["frames"])
-    totals: Totals = {}
-    rows: dict[Any, Any] = means.to_dict("index")
-    for (variant, stage), row in rows.items():
-        totals.setdefault(variant, {})[stage] = row
-    return totals
+    by_variant = means.groupby(level="variant", sort=False)
+    return {name: rows.droplevel("variant").to_dict("index") for name, rows in by_variant}
 
 
 def _warnings_of_copies(

@@ -181,9 +181,10 @@ def table_of_scores(
     import pandas as pd
 
     by = [*KEY, *MASK]
-    masks = totals(frames, by).reset_index().assign(region=ALL, final=is_final)
+    masks = totals(frames, by).assign(truth=group_rows(frames, by)["truth"].sum()).reset_index()
+    masks = masks.assign(region=ALL, final=is_final)
     parts = totals(regions[regions["N"] > 0], [*by, "region"]).reset_index()
-    parts = parts.merge(masks[[*by, "final"]], on=by)
+    parts = parts.merge(masks[[*by, "final"]], on=by).assign(truth=0)
     if beyond:
         further = pd.DataFrame([*beyond]).assign(final=True)
         masks = masks.merge(further, on=[*KEY, "variant", "final"], how="left")

@@ -59,7 +59,7 @@ class Column(NamedTuple):
 
 
 LATER: Final = ("truth",)
-"""Columns of counts that the first CSV files of this format lack; they are read as 0, for unknown.
+"""Columns of counts that the first files of this format lack; they are read as 0, for unknown.
 Without any other column a file is damaged."""
 
 
@@ -309,6 +309,7 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         Column("episode_seconds", Kind.NUMBER, "their total length", "s"),
         Column("flicker", Kind.RATE, "share of pixels that change from frame to frame"),
         Column("truth_flicker", Kind.RATE, "share of pixels that change in the truth"),
+        Column("truth", Kind.COUNT, "checksum of the truth of all frames, of `all`; 0 is unknown"),
     ),
     "effects": (
         *KEY,

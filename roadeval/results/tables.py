@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from io import BytesIO
@@ -114,11 +114,8 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
     parsed = csv.read_csv(BytesIO(content), convert_options=options)
     if not content.endswith(b"\n"):
         raise ValueError("its last line is cut off")
-    for name in sorted({*table.names} & {*LATER} - {*parsed.column_names}):
-        parsed = parsed.append_column(name, pa.array(np.zeros(len(parsed), np.int64)))
     complete = [c.name for c in table.columns if c.kind not in (Kind.RATE, Kind.NUMBER)]
-    _check_columns(parsed, table.columns, complete)
-    parsed = parsed.unify_dictionaries()
+    parsed = _check_columns(parsed, table.columns, complete).unify_dictionaries()
     for column in (column for column in table.columns if column.is_word):
         names = _words_of(parsed[column.name])
         if len(names) > (WORDS if column.kind is Kind.NAME else 10 * WORDS):
@@ -130,21 +127,24 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
     return parsed
 
 
-def _check_columns(table: pa.Table, columns: Sequence[Column], complete: Container[str]) -> None:
-    """Raise a ValueError unless a table has all columns, and values in the ``complete`` ones."""
+def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Container[str]) -> pa.Table:
+    """Return rows with the columns of `LATER`; a ValueError if others, or values, are lacking."""
     import pyarrow as pa
 
-    if len({*table.column_names}) < len(table.column_names):
+    for name in sorted({*LATER} & {column.name for column in columns} - {*rows.column_names}):
+        rows = rows.append_column(name, pa.array(np.zeros(len(rows), np.int64)))
+    if len({*rows.column_names}) < len(rows.column_names):
         raise ValueError("a column is there twice")
-    if missing := [column.name for column in columns if column.name not in table.column_names]:
+    if missing := [column.name for column in columns if column.name not in rows.column_names]:
         raise ValueError(f"no column {', '.join(missing)}")
-    for name, cells, kind in ((c.name, table[c.name], c.kind) for c in columns):
+    for name, cells, kind in ((c.name, rows[c.name], c.kind) for c in columns):
         expected = pa.type_for_alias(TYPES[kind])
         is_dictionary = pa.types.is_dictionary(cells.type)
         if (cells.type.value_type if is_dictionary else cells.type) != expected:
             raise ValueError(f"column {name} is not of type {expected}")
         if cells.null_count and name in complete:
             raise ValueError(f"column {name} lacks a value")
+    return rows
 
 
 def _words_of(cells: pa.ChunkedArray) -> list[str]:
@@ -196,37 +196,51 @@ def made_of(path: Path) -> str:
         return ""
 
 
-def read_parquet(paths: Sequence[Path], name: str) -> pd.DataFrame:
+def read_parquet(
+    paths: Sequence[Path],
+    name: str,
+    columns: Collection[str] | None = None,
+    runs: Sequence[int] | None = None,
+) -> pd.DataFrame:
     """Read a table of a fleet's folder from its files, one below the other.
 
-    A `ResultsError` if one is missing or damaged, or has not the columns that it must have.
+    With ``columns`` only these, and tags, are read and checked; ``drive`` must be one of them.
+    ``runs`` has a number for each file, which a column ``run`` then says of its rows. A
+    `ResultsError` if a file is missing or damaged, or has not the columns that it must have.
     """
     import pandas as pd
     import pyarrow as pa
 
     try:
-        table = _read_files(paths, TABLES[name])
+        table = _read_files(paths, TABLES[name], columns, runs)
     except FileNotFoundError as error:
         raise ResultsError(f"{error.filename}: is not there; {AGAIN}") from None
     except (OSError, ValueError, pa.ArrowException) as error:
         for path in paths if len(paths) > 1 else ():
-            read_parquet([path], name)  # the damaged one is named
+            read_parquet([path], name, columns)  # the damaged one is named
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
     rows: pd.DataFrame = table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
     counts = [n for n in rows if rows[n].dtype == "Int64" and not rows[n].hasnans]
-    return rows.astype(dict.fromkeys(counts, np.int64))
+    return rows.astype(dict.fromkeys(counts, np.int64)) if counts else rows
 
 
-def _read_files(paths: Sequence[Path], table: TableSchema) -> pa.Table:
+def _read_files(
+    paths: Sequence[Path],
+    table: TableSchema,
+    chosen: Collection[str] | None,
+    runs: Sequence[int] | None,
+) -> pa.Table:
     """Read files of a table and check them; a ValueError tells what is wrong with them."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    columns = (*table.columns, *table.of_a_fleet)
+    columns = [c for c in (*table.columns, *table.of_a_fleet) if not chosen or c.name in chosen]
+    names = [column.name for column in columns]
     words = [column.name for column in columns if column.is_word]
-    parts = []
-    for path in paths:
+    parts, of_drives = [], table.name == "drives"
+    complete = ("drive", "name", "status") if of_drives else words
+    for place, path in enumerate(paths):
         check_input(path)
         metadata = parquet.read_metadata(path)
         _check_size(metadata, path.stat().st_size)
@@ -234,10 +248,14 @@ def _read_files(paths: Sequence[Path], table: TableSchema) -> pa.Table:
         with parquet.ParquetFile(
             path, metadata=metadata, read_dictionary=words, page_checksum_verification=True
         ) as file:
-            parts.append(file.read(use_threads=False))
-    rows = pa.concat_tables(parts or [table.arrow().empty_table()]).unify_dictionaries()
-    of_drives = table.name == "drives"
-    _check_columns(rows, columns, ("drive", "name", "status") if of_drives else words)
+            tags = [n for n in file.schema_arrow.names if of_drives and n.startswith(TAG)]
+            part = file.read([*names, *tags] if chosen else None, use_threads=False)
+            parts.append(_check_columns(part, columns, complete))
+            if runs:
+                run = np.full(len(part), runs[place])
+                parts[-1] = parts[-1].append_column("run", pa.array(run))
+    rows = pa.concat_tables(parts or [table.arrow().empty_table()], promote_options="default")
+    rows = rows.unify_dictionaries()
     for cells in (rows[word] for word in words if pa.types.is_dictionary(rows[word].type)):
         texts = _words_of(cells)
         if any(len(text) > LONG for text in texts):  # many rows may have one
@@ -247,7 +265,7 @@ def _read_files(paths: Sequence[Path], table: TableSchema) -> pa.Table:
         if not is_plain(drive):
             raise ValueError(f"a drive is called {drive[:NAMED]!r}, which is no name")
     tags = [name for name in rows.column_names if of_drives and name.startswith(TAG)]
-    return rows.select([*(column.name for column in columns), *tags])
+    return rows.select([*names, *tags, *(["run"] if runs else [])])
 
 
 def _check_size(metadata: parquet.FileMetaData, size: int) -> None:

@@ -210,6 +210,7 @@ OTHER = {
     "output.mcap": "masks.mcap",
     "output.record": "worst:7",
     "output.focus": "unfiltered",
+    "output.labels": {"branch": 'main, "as is"', "commit": "1a2b"},
     "preset": "gated",
     "variants": {"wide": {"preset": "printed", "shadow": {"ring_width": 3}}},
     "cameras": [{"image": "/left/image", "name": "left", "masks": {"net": "/net"}}],

@@ -48,6 +48,7 @@ def steady_json(text: str) -> str:
     """Leave the same out of JSON, and the last digits of numbers, which hang on the processor."""
     content = json.loads(text)
     content["versions"] = dict.fromkeys(content["versions"], "<version>")
+    content["origin"] |= {"made_ns": "<ns>", "commit": "<commit>", "dirty": "<dirty>"}
     content["seconds"] = {
         variant: dict.fromkeys(stages, "<s>") for variant, stages in content["seconds"].items()
     }

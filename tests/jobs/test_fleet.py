@@ -88,6 +88,17 @@ def test_other_versions_of_what_computes_replay_every_drive(logs, folder, monkey
     assert run(logs, folder, keep="all")[0].replayed == 2
 
 
+def test_another_label_replays_no_drive_and_is_that_of_the_last_run(logs, folder):
+    config = roadeval.configure({**test_fleet.OPTIONS, "only": ["unfiltered"]})
+    config = config.override({"fleet": {"keep": "all"}, "output": {"labels": {"branch": "main"}}})
+    before = roadeval.Result(folder).facts.origin
+    again = roadeval.replay_fleet([logs], folder, config, executor=Here())
+    after = roadeval.Result(folder).facts.origin
+    assert (again.replayed, again.facts.origin) == (0, after)
+    assert (before.labels, after.labels) == ({}, {"branch": "main"})
+    assert before.made_ns < after.made_ns
+
+
 def test_a_worker_with_another_version_is_refused(logs, tmp_path, monkeypatch):
     other = prepared.computing() | {"numpy": "1.0"}
 

@@ -1,6 +1,7 @@
 """The main job, on a small log of our own: outputs, identity, training of several."""
 
 import shutil
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -8,11 +9,14 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
+from roadeval.config.run import load_config
 from roadeval.jobs.run import prepared
+from roadeval.jobs.run import replay as replaying
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LogConfig, TopicSettings
 from roadeval.report import figures as drawn
 from roadeval.results import schema
+from roadeval.results.facts import Origin
 from roadeval.results.folder import ResultsFolder
 from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
@@ -98,6 +102,22 @@ def test_without_a_recording_the_tables_are_the_same(drive, once, tmp_path):
     assert not (tmp_path / "out.rrd").exists()
     frames = (tmp_path / "reports" / "frames.csv").read_bytes()
     assert frames == (once[0] / "reports" / "frames.csv").read_bytes()
+
+
+def test_time_commit_and_labels_are_in_the_summary_and_not_in_the_recording(
+    drive, once, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(replaying, "current_commit", lambda: ("1a2b", True))
+    config = settings(max_frames=14).override({"output": {"labels": {"branch": "main"}}})
+    begun = time.time_ns()
+    done = roadeval.replay(drive, config, save=tmp_path / "o.rrd", reports=tmp_path / "o")
+    origin = roadeval.Result(tmp_path / "o").facts.origin
+    assert begun < origin.made_ns < time.time_ns()
+    assert origin == Origin(origin.made_ns, "1a2b", dirty=True, labels={"branch": "main"})
+    assert done.facts.origin == origin
+    recorded = roadeval.Result(tmp_path / "o.rrd").facts
+    assert (recorded.origin, recorded.run["output"]["labels"]) == (None, {})
+    assert load_config(tmp_path / "o" / "run.toml").output.labels == origin.labels
 
 
 @pytest.mark.parametrize(

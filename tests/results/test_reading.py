@@ -157,8 +157,20 @@ def test_each_mask_has_a_row_of_its_own_on_all_pixels_and_one_of_each_region():
         ["road", "svm", "all", True, 1, pytest.approx(0.5)],
     ]
     assert rows["boundary_f"].fillna(-1).tolist() == [-1, 0.7, -1, -1, -1]
+    assert rows["truth"].tolist() == [14, 14, 0, 0, 7]
     pooled = metrics.of(Counts(tp=100, tn=60, fp=40))
     assert rows["pooled_FPR"].iloc[1] == pooled["FPR"]
+
+
+def test_the_truth_of_a_drive_has_a_checksum_whatever_the_order_of_its_frames():
+    frames = a_table({("net", "post"): [20, 40, 10]}).assign(truth=[2**63 - 1, 2**32 - 1, 7])
+    there, back = (
+        table_of_scores(rows, table_of("regions", [of_region(0, 2)]), [])
+        for rows in (frames, frames[::-1])
+    )
+    wrapped = 2**63 + 2**32 + 5 - 2**64
+    assert there["truth"].tolist() == back["truth"].tolist() == [wrapped, 0]
+    assert there["truth"].dtype == np.int64
 
 
 def test_nothing_scored_has_no_scores():

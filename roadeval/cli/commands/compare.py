@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages
 
 Results = Annotated[
-    list[Path],
+    list[str],
     arguments.argument(
         "BASE NEW...",
-        "Recordings, results folders or fleets; for a single one, its variants are compared.",
+        "Recordings, results folders, fleets or URLs; of a single one variants are compared.",
     ),
 ]
 Variants = Annotated[
@@ -27,14 +28,18 @@ Outputs = Annotated[
     list[Path] | None,
     arguments.option(
         "-o --output",
-        "File of the comparison, whose ending is .pdf, .html, .md or .json. Repeatable.",
+        "File whose ending is .pdf, .html, .md, .json, or .svg (a badge). Repeatable.",
         "FILE",
-        callback=arguments.ending_in(".pdf", ".html", ".md", ".json"),
+        callback=arguments.ending_in(".pdf", ".html", ".md", ".json", ".svg"),
     ),
 ]
 Junit = Annotated[
     Path | None,
     arguments.option("--junit", "File of JUnit's XML with a case for each condition.", "FILE"),
+]
+Markdown = Annotated[
+    Path | None,
+    arguments.option("--markdown", "File with the text of one comment on a pull request.", "FILE"),
 ]
 
 
@@ -45,6 +50,7 @@ def compare(
     fail_if: arguments.Conditions = None,
     output: Outputs = None,
     junit: Junit = None,
+    markdown: Markdown = None,
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -63,12 +69,15 @@ def compare(
     from roadeval.jobs.outputs import holding
     from roadeval.jobs.results import compare as comparing
 
-    with holding(*(output or ()), *filter(None, [junit]), inputs=results):
+    options = [f"--variant={name}" for name in variant or ()]
+    options += [f"--fail-if={condition}" for condition in fail_if or ()]
+    typed = shlex.join(["roadeval", "compare", *map(str, results), *options])
+    files = [(path, "") for path in output or ()]
+    files += [(path, kind) for path, kind in ((junit, "junit"), (markdown, "comment")) if path]
+    with holding(*(path for path, _ in files), inputs=results):
         compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
-        for path in output or []:
-            comparing.write(compared, path)
-        if junit:
-            comparing.write_junit(compared, junit)
+        for path, kind in files:
+            comparing.write(compared, path, kind, typed)
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:
@@ -79,4 +88,4 @@ def compare(
     if not (json or quiet):
         screen.show_verdict(compared.comparison, console.results())
     lost = messages.losses(compared.lost)
-    return messages.conditions(compared.held, compared.unjudged) or lost
+    return messages.conditions(compared.judgements) or lost

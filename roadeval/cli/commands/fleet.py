@@ -21,7 +21,7 @@ Drives = Annotated[
 @takes(
     *("preset", "config", "variants", "nets", "masks", "tunes", "only", "cameras", "ground"),
     *("training", "truth", "topics", "labels", "frames"),
-    *("output.record", "output.focus", "fleet", "run"),
+    *("output.record", "output.focus", "output.labels", "fleet", "run"),
 )
 def fleet(
     paths: Drives,

@@ -16,11 +16,15 @@ from roadeval.evaluation.comparison.conditions import Condition, Judgement, judg
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.history import last_good
+from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
-from roadeval.report.pdf.typeset import typeset, write_file
-from roadeval.results.comparison import as_dict, describe_judgement, junit_xml
+from roadeval.report.comment import badge
+from roadeval.report.comparison import comment, document, markdown
+from roadeval.report.pdf.typeset import write_file
+from roadeval.report.writing import write_document
+from roadeval.results.comparison import as_dict, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
 from roadeval.runtime.files import Paths, list_paths
@@ -50,33 +54,20 @@ class Compared:
         """The content of the JSON file."""
         return as_dict(self.comparison, self.judgements)
 
-    @property
-    def held(self) -> list[str]:
-        """The sentences of the conditions that hold."""
-        return [describe_judgement(judgement) for judgement in self.judgements if judgement.holds]
-
-    @property
-    def unjudged(self) -> list[str]:
-        """Why conditions could not be judged."""
-        return [
-            describe_judgement(judgement)
-            for judgement in self.judgements
-            if judgement.holds is None
-        ]
-
 
 def compare(
     results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 
-    A `RoadevalError` if a result cannot be read, or there is nothing to compare. Why a condition
-    cannot be judged is in `Compared.unjudged`.
+    A `RoadevalError` if a result cannot be read, or there is nothing to compare. A
+    condition that cannot be judged has a judgement that says why.
 
     Parameters
     ----------
     results
         Recordings, results folders or fleets' folders. Of a single one the variants are compared.
+        The base may be a folder of many runs: their last good one, see `roadeval.history`.
     variants
         Of several results: only these, where ``a=b`` holds the base's ``a`` against the others'
         ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
@@ -85,10 +76,11 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [Path(path) for path in list_paths(results)]
+    paths = [local_path(path) for path in list_paths(results)]
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
+    paths[:1] = paths[:1] if across else [last_good(paths[0], paths[1:])]
     opened = [Result(path) for path in paths]
     if across:
         opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
@@ -160,37 +152,27 @@ def _name_results(paths: Sequence[Path]) -> list[str]:
     return labels
 
 
-def write(compared: Compared, path: Path) -> Path:
-    """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
+def write(compared: Compared, path: Path, kind: str = "", command: str = "") -> Path:
+    """Write a comparison as PDF, page, Markdown, badge or JSON, by the file's ending.
 
-    A `RoadevalError` if the ending is another, or the file cannot be written.
+    The ``kind`` may be "junit", or "comment", which has the ``command`` that repeats it. A
+    `RoadevalError` if the ending is another, or the file cannot be written.
     """
-    match path.suffix.lower():
-        case ".pdf":
-            content = typeset(_document(compared))
-        case ".html":
-            content = as_page(compared)
-        case ".md":
-            from roadeval.report.comparison import markdown
-
-            content = markdown(compared.comparison, compared.judgements).encode()
-        case ".json":
-            content = as_json(compared).encode()
-        case _:
-            raise RoadevalError(f"{path}: a comparison is written as .pdf, .html, .md, .json")
-    return write_file(path, content)
-
-
-def as_page(compared: Compared) -> bytes:
-    """Return a comparison as a page that is whole by itself."""
-    from roadeval.report.page.render import page
-
-    return page(_document(compared))
+    about = compared.comparison, compared.judgements
+    if kind == "junit":
+        return write_file(path, junit_xml(*about))
+    if kind == "comment":
+        return write_file(path, comment(*about, over_drive(compared), command).encode())
+    if path.suffix.lower() == ".svg":
+        return write_file(path, badge(*about).encode())
+    return write_document(
+        *(path, "a comparison", lambda: _document(compared)),
+        lambda: markdown(*about),
+        lambda: as_json(compared),
+    )
 
 
 def _document(compared: Compared) -> Report:
-    from roadeval.report.comparison import document
-
     def command(result: str, frame: int) -> str:
         drive = compared.recordings.get(result)
         return drive.inspect(frame) if drive else ""
@@ -199,14 +181,6 @@ def _document(compared: Compared) -> Report:
         *(compared.comparison, compared.judgements, over_drive(compared)),
         command if compared.recordings else None,
     )
-
-
-def write_junit(compared: Compared, path: Path) -> Path:
-    """Write what changed and the judged conditions as JUnit's XML.
-
-    A `RoadevalError` if the file cannot be written.
-    """
-    return write_file(path, junit_xml(compared.comparison, compared.judgements))
 
 
 def as_json(compared: Compared) -> str:
@@ -220,56 +194,35 @@ ROWS: Final = 60
 """Points of the figure over the drive, at most."""
 
 
-@dataclass(frozen=True)
-class ComparedMask:
-    """A final mask that is compared."""
-
-    name: str
-    result: str
-    variant: str
-
-
-def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], pd.DataFrame] | None:
-    """Return the final masks that all results have, and their rows in the order of the frames.
-
-    Each mask's rows have its name as variant; of a variant they are those of the frames on which
-    all results have its mask. Where the variants of one result are compared, each is a result.
-    None without any.
-    """
-    masks_of = {side.label: finals(_frames(side)) for side in sides}
-    alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
-    masks, parts = [], []
-    for variant in dict.fromkeys(v for rows in masks_of.values() for v in rows["variant"]):
-        there = {s: only(masks_of[s.label], variant=variant) for s in sides}
-        there = {side: rows for side, rows in there.items() if len(rows)}
-        if not alone and (variant == BASELINE or len(there) < len(sides)):
-            continue
-        common = set.intersection(*(set(rows["frame"]) for rows in there.values()))
-        for side, rows in there.items() if common else ():
-            name = side.label if alone else f"{side.label}: {variant}"
-            masks.append(ComparedMask(name, side.label, variant))
-            in_all = rows[rows["frame"].isin(common)]
-            parts.append(in_all.assign(variant=name, stage="final"))
-    if not parts:
-        return None
-    return masks, concatenate(parts).sort_values("frame", kind="stable")
-
-
 def _frames(side: Side) -> pd.DataFrame:
     """Return the rows of ``frames`` of the one drive that is compared."""
     return side.table("frames", [side.drives[0].key])
 
 
 def over_drive(compared: Compared) -> list[Chart]:
-    """Return ERR over the one drive that is compared, and the baseline's; none of several."""
-    if (common := compared_masks(compared.sides)) is None:
+    """Return ERR over the one drive, and the baseline's, on the frames that all results have."""
+    masks_of = {side.label: finals(_frames(side)) for side in compared.sides}
+    alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
+    masks, parts = {}, []
+    for variant in dict.fromkeys(v for rows in masks_of.values() for v in rows["variant"]):
+        there = {label: only(rows, variant=variant) for label, rows in masks_of.items()}
+        there = {label: rows for label, rows in there.items() if len(rows)}
+        if not alone and (variant == BASELINE or len(there) < len(masks_of)):
+            continue
+        common = set.intersection(*(set(rows["frame"]) for rows in there.values()))
+        for label, rows in there.items() if common else ():
+            name = label if alone else f"{label}: {variant}"
+            masks[name] = label, variant
+            in_all = rows[rows["frame"].isin(common)]
+            parts.append(in_all.assign(variant=name, stage="final"))
+    if not parts:
         return []
-    masks, rows = common
+    rows = concatenate(parts).sort_values("frame", kind="stable")
     blind = finals(only(_frames(compared.sides[0]), variant=BASELINE))
     rows = concatenate([rows, blind[blind["frame"].isin(rows["frame"])].assign(stage="final")])
     size = compared.comparison.settings.window
     size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
     rows = rows.assign(drive="", camera="")  # the results may call them differently
     # A hue a variant, a dash a result.
-    of_masks = looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
-    return over_windows(windows(rows, size), [TESTED], of_masks | looks([BASELINE]))
+    by_mask = looks_of_results(masks) | looks([BASELINE])
+    return over_windows(windows(rows, size), [TESTED], by_mask)

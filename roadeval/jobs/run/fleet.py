@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, as_completed
@@ -37,10 +38,11 @@ from roadeval.jobs.run.fleet_work import (
     train_fold,
 )
 from roadeval.jobs.run.prepared import software
-from roadeval.results.facts import FleetFacts, Member
+from roadeval.results.facts import FleetFacts, Member, Origin
 from roadeval.results.fleet import FleetWriter, made_path
 from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.files import AnyPath, Paths, is_claimed, list_paths, reading, sha256_of
+from roadeval.runtime.repository import current_commit
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
@@ -96,7 +98,7 @@ def replay_fleet(
     on_progress
         Called in the caller's thread as drives are done.
     """
-    config = (config or RunConfig()).resolved()
+    commit, config = current_commit(), (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in list_paths(drives)])
     if config.cameras:
         entries = name_cameras(
@@ -118,7 +120,9 @@ def replay_fleet(
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
     asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    facts = writer.finish(members, config.evaluation, config.as_dict(), text, asked=asked)
+    how = config.evaluation, config.as_dict(), text
+    origin = Origin(time.time_ns(), *commit, {**config.output.labels})
+    facts = writer.finish(members, *how, asked=asked, origin=origin)
     counts = Counter(drive.status for drive in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not drive.repeated for drive in run.done.values())
@@ -159,11 +163,6 @@ class FleetRun:
         progress = Progress(len(done), len(self.entries), stage, "", "drives", ", ".join(detail))
         self.on_progress(progress)
 
-    def _task(
-        self, entry: DriveEntry, config: RunConfig, model: str, fold: int | None
-    ) -> DriveTask:
-        return DriveTask(self.folder, entry, config, software(config), model, fold)
-
     def _by_model(self) -> Iterator[DriveTask]:
         """Yield the tasks of drives that one model scores, or that train their own."""
         digest, model = "", self.config.training.model
@@ -171,7 +170,8 @@ class FleetRun:
             with reading(model, FleetError, "cannot read the model"):
                 digest = sha256_of(Path(model))
         for entry in self.entries:
-            yield self._task(entry, entry.config(self.config), digest, None)
+            config = entry.config(self.config)
+            yield DriveTask(self.folder, entry, config, software(config), digest)
 
     def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
@@ -224,7 +224,8 @@ class FleetRun:
             model = made[folds[entry.id]]
             path = str(training[model.fold].path)
             config = configs[entry.id].override({"training": {"model": path}})
-            task = self._task(entry, config, model.sha256, model.fold)
+            how = software(config), model.sha256, model.fold
+            task = DriveTask(self.folder, entry, config, *how)
             if model.problem:
                 self._fail(task, model.problem)
             else:

@@ -84,9 +84,6 @@ class Failures:
     first: list[Failure] | None = field(default_factory=list)
     """The failures of `TRIED` roles; None once a frame of these did not fail."""
 
-    def __len__(self) -> int:
-        return sum(map(len, self.by_error.values()))
-
     def add(self, failure: Failure) -> None:
         """Note a frame; its traceback is kept where it is among the first that differ."""
         error = failure.variant, _NUMBER.sub("", failure.reason)
@@ -251,8 +248,9 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
             frames,
         )
         on_progress(Progress(0, None, "opening", note))
-    learn = partial(_learn, again, variants, config.training, on_progress)
-    model, schedule = learn(labelled=labelled, picks=picks)
+    model, schedule = _learn(
+        again, variants, config.training, on_progress, labelled=labelled, picks=picks
+    )
     try:
         chains = bind(variants, model)
     except MisfitError as error:
@@ -454,12 +452,12 @@ def _process(
     role = run.schedule.role(frame)
     if role is Role.UNLABELLED and frame.truth is not None:
         frame = replace(frame, truth=None, classes=None)  # it is a proposal as it was made
-    truths_known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
+    is_scored = role is Role.EVALUATED
+    truths = {"truth": frame.truth, "shadow_truth": frame.shadow_truth} if is_scored else {}
     shared: dict[Any, Any] = {}
     view = View.of_frame(frame)
     variants = []
     for name, chain in run.chains.items():
-        truths = {"truth": truths_known[0], "shadow_truth": truths_known[1]}
         try:
             variant_result = run_variant(name, chain, view, **truths, known=shared)
         except AbsentError:
@@ -474,7 +472,7 @@ def _process(
         if name not in run.chains
     ]
     result = run.board.score(frame, role, tuple(variants))
-    disturbed, failures = _disturb(run, frame) if role is Role.EVALUATED else ({}, [])
+    disturbed, failures = _disturb(run, frame) if is_scored else ({}, [])
     result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = csv_lines(run.key, frame_rows(result))
     encoded = recorder.encode(result, position - 1) if recorder else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -23,13 +24,14 @@ from roadeval.logs.log import Log, open_log
 from roadeval.logs.writing.writer import SidecarWriter
 from roadeval.recording.layout import RecordRule
 from roadeval.report.images import ExampleFrame
-from roadeval.results.facts import Facts
+from roadeval.results.facts import Facts, Origin
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import csv_lines, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.why import explain
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
+from roadeval.runtime.repository import current_commit
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
 
@@ -119,7 +121,7 @@ def _replay_log(
     log: Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
 ) -> Outcome:
     """Run over the log. All outputs are whole before the first of them takes its name."""
-    cameras = config.by_camera()
+    commit, cameras = current_commit(), config.by_camera()
     runs = [
         prepare(log.for_camera(camera_config) if name else log, camera_config, on_progress, name)
         for name, camera_config in cameras.items()
@@ -147,6 +149,7 @@ def _replay_log(
                 for camera, end in zip(cameras, ended, strict=True):
                     windows, shown = end.sums.windows, drawn[camera]
                     write_figures(results.folder, log.name, windows, shown, names[camera])
+        facts = replace(facts, origin=Origin(time.time_ns(), *commit, {**config.output.labels}))
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     of_focus = finals(only(ended[0].sums.frames, variant=facts.focus or ""))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])

@@ -11,7 +11,7 @@ from pyarrow import parquet
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import only
 from roadeval.results.fleet import FleetFolder, FleetWriter, Made, cached_path, read_made
-from roadeval.results.tables import ResultsError
+from roadeval.results.tables import ResultsError, read_parquet
 from tests.results.fleet.making import fleet_of
 
 
@@ -86,6 +86,44 @@ def test_a_flipped_bit_in_a_table_s_page_is_damage(folder, table):
         path.write_bytes(content[:last] + bytes([content[last] ^ 1]) + content[last + 1 :])
         with pytest.raises(ResultsError, match=rf"{table}\.parquet: damaged"):
             FleetFolder(folder).table(table)
+
+
+def test_some_columns_are_read_alone_with_tags_and_damage_elsewhere_is_not_seen(folder):
+    whole, path = FleetFolder(folder), folder / "drives.parquet"
+    columns = {"drives": ["drive", "evaluated"], "scores": ["drive", "truth", "ERR"]}
+    for name, chosen in columns.items():
+        rows = whole.table(name)
+        tags = [column for column in rows if column.startswith("tag_")]
+        some = read_parquet([folder / f"{name}.parquet"], name, chosen)
+        assert {*some} == {*chosen, *tags}
+        assert some.equals(rows[[*some]])
+        with pytest.raises(ResultsError, match=r"damaged .no column FPR"):
+            read_parquet([path], "scores", ["drive", "FPR"])
+    place = path.read_bytes().index(b"/camera/image")
+    path.write_bytes(path.read_bytes().replace(b"/camera/image", b"/camera/imagf"))
+    assert place > 0
+    with pytest.raises(ResultsError, match="damaged"):
+        whole.table("drives")
+    assert len(read_parquet([path], "drives", columns["drives"])) == 5
+
+
+def test_of_an_older_fleet_nothing_is_known_of_the_truth(folder):
+    rows = FleetFolder(folder).table("scores")
+    for name in ("scores", "frames"):
+        for path in folder.rglob(f"{name}.parquet"):
+            parquet.write_table(parquet.read_table(path, partitioning=None).drop("truth"), path)
+    older = FleetFolder(folder)
+    assert older.table("scores").equals(rows.assign(truth=0))
+    assert {*older.table("frames")["truth"]} == {0}
+    some = read_parquet([folder / "scores.parquet"], "scores", ["drive", "truth"])
+    assert {*some["truth"]} == {0}
+
+
+def test_a_column_that_one_of_several_files_lacks_is_damage(folder):
+    paths = [folder / "first.parquet", folder / "scores.parquet"]
+    parquet.write_table(parquet.read_table(paths[1]).drop("FPR"), paths[0])
+    with pytest.raises(ResultsError, match=r"first\.parquet: damaged .no column FPR"):
+        read_parquet(paths, "scores")
 
 
 # --- How a drive's results were made: written and read back as it was -----------------------------

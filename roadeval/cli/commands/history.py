@@ -1,0 +1,64 @@
+"""``roadeval history``: since when which rate is worse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli.arguments import argument, option
+
+
+def history(
+    results: Annotated[
+        list[str],
+        argument("RESULT...|FOLDER", "Results of many runs, or folders with results below."),
+    ],
+    *,
+    by: Annotated[
+        str | None,
+        option("--by", "Label of --label: results with the same value are one run.", "NAME"),
+    ] = None,
+    last: Annotated[
+        int,
+        option("--last", "Earlier runs with whose mean --fail-if compares the last.", "N", min=1),
+    ] = 7,
+    fail_if: arguments.Conditions = None,
+    output: Annotated[
+        list[Path] | None,
+        option(
+            "-o --output",
+            "File of the history, whose ending is .html, .pdf, .md or .json. Repeatable.",
+            "FILE",
+            callback=arguments.ending_in(".html", ".pdf", ".md", ".json"),
+        ),
+    ] = None,
+    json: arguments.Json = False,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Show since when which rate is worse, over many runs.
+
+        roadeval history nightly/
+        roadeval history nightly/ --last 10 -o history.html
+
+    Runs are in the order in which they were made. Drives are paired, so one that comes or goes
+    changes nothing, and one whose truth changed begins anew. In a year of nightly runs the chance
+    of any false step is at most 5 %. Exit code 4 if a --fail-if condition holds for the last run
+    against the mean of the --last runs before it; 1 if it cannot be judged; 3 if a result cannot be
+    read.
+    """
+    from roadeval.cli.screens import history as screen
+    from roadeval.jobs.outputs import holding
+    from roadeval.jobs.results import history as job
+
+    with holding(*(output or ()), inputs=results):
+        with progress.show(quiet or json) as watch:
+            made = job.history(results, by=by, last=last, fail_if=fail_if or [], on_progress=watch)
+        for path in output or []:
+            job.write(made, path)
+    if json:
+        console.emit(job.as_json(made).rstrip())
+    elif not quiet:
+        screen.show(made, console.results())
+    lost = messages.losses(made.lost)
+    return messages.conditions(made.judgements) or lost

@@ -1,0 +1,254 @@
+"""Many runs over the same drives: which rate changed in which run.
+
+A run is compared with the runs before it on the drives that both have. A drive whose log, frames or
+truth changed is another drive from then on: its numbers are of other pixels.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from roadeval.data.arrays import Flags, Floats, Sums
+from roadeval.evaluation.comparison.compare import MaskChange
+from roadeval.evaluation.comparison.conditions import Condition, Judgement
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.regions import ALL, titles
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
+from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference, holm, over_drives
+from roadeval.evaluation.stats.steps import Step, trace
+from roadeval.evaluation.tables import KEY, group_rows, only, values_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PIXELS: Final = ("log_digest", "truth", "frames", "road", "N")
+"""Columns that tell whether two runs scored the same pixels of a drive."""
+MASK_RATES: Final = (TESTED, "FPR", "FNR")
+"""The rates of a whole mask that are searched; of a part of its pixels only the first is."""
+
+
+class Line(NamedTuple):
+    """A rate of a final mask, or of some of its pixels, run by run."""
+
+    variant: str
+    stage: str
+    """The stage of the final mask."""
+    kind: str
+    """``all`` pixels, those of a ``region`` or a ``class``, or the name of the drives' tag."""
+    part: str
+    """The region, the class, or the value of the tag."""
+    rate: str
+    title: str
+    """The rate and its pixels or drives for people, without the variant."""
+    rates: Floats
+    """``(T,)`` mean over the drives of each run; NaN where it has none."""
+    levels: Floats
+    """``(T,)`` the same as if every run had the drives of the last one."""
+    ends: Floats
+    """``(2, T)`` ends of the interval of each run's mean change over its drives, around the level;
+    empty but for `TESTED` of all pixels, and NaN with too few drives."""
+    noise: float
+    steps: tuple[Step, ...]
+    drive_rates: Floats
+    """``(T, D)`` mean of each drive in each run."""
+    drives: pd.DataFrame
+    """The name and the group of each drive, and its camera."""
+
+    @property
+    def name(self) -> str:
+        """Its name in a condition, if it is of all pixels."""
+        return f"{self.stage}.{self.variant}.{self.rate}"
+
+
+class Change(NamedTuple):
+    """A step of a line, and the drives that carry it."""
+
+    line: Line
+    step: Step
+    difference: Difference
+    """Mean after it minus mean before it, over the drives that were there before and after."""
+    drives: pd.DataFrame
+    """These drives with the means ``before`` and ``after``, the greatest change first."""
+
+
+def find_lines(rows: pd.DataFrame, tags: Mapping[str, str], count: int) -> list[Line]:
+    """Return the lines of ``count`` runs, with their steps.
+
+    ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
+    ``part`` of the pixels: its rates, the drive's ``group``, the columns `PIXELS`, and those of the
+    drives' ``tags``, whose names are given by column. All lines are one family, see
+    `roadeval.evaluation.stats.steps`.
+    """
+    parts = [*group_rows(rows, ["variant", "kind", "part"])]
+    masks = only(rows, kind=ALL)
+    for column, tag in tags.items():
+        by_value = group_rows(masks[masks[column].notna()], ["variant", column])
+        parts += [((variant, tag, value), part) for (variant, value), part in by_value]
+    searched = [
+        (address, rate, part)
+        for address, part in parts
+        for rate in (MASK_RATES if address[1] == ALL else MASK_RATES[:1])
+    ]
+    names = titles(values_of(only(rows, kind="region"), "part"))
+    family = len(searched)
+    return [_line(*one, names=names, count=count, family=family) for one in searched]
+
+
+def _line(
+    address: tuple[str, str, str],
+    rate: str,
+    rows: pd.DataFrame,
+    *,
+    names: Mapping[str, str],
+    count: int,
+    family: int,
+) -> Line:
+    variant, kind, part = map(str, address)
+    name = {ALL: "", "region": names.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
+    title = ", ".join(filter(None, (rate, name)))
+    drive = group_rows(rows, [*KEY, *PIXELS]).ngroup().to_numpy()
+    drives = rows[[*KEY, "group"]][~rows.duplicated([*KEY, *PIXELS])].astype("str")
+    values = np.full((count, len(drives)), np.nan)
+    values[rows["run"], drive] = rows[rate]
+    same = group_rows(drives.drop_duplicates(), ["group"]).size()
+    weights = 1 / drives["group"].map(same).to_numpy(float)
+    there = ~np.isnan(values)
+    rates = np.where(there, values, 0) @ weights
+    with np.errstate(invalid="ignore"):
+        rates /= there @ weights
+    levels, noise, steps = np.full(count, np.nan), 0.0, []
+    for runs in _stretches(there):
+        traced = trace(values[runs], weights, family)
+        levels[runs] = traced.levels - traced.levels[-1] + rates[runs[-1]]
+        noise = traced.noise
+        for step in traced.steps:
+            before, run, after, found = (int(runs[place]) for place in step[1:5])
+            steps.append(Step(step.kind, before, run, after, found, step.change))
+    about = variant, str(rows["stage"].iloc[-1]), kind, part, rate, title
+    ends = np.zeros((0, count))
+    if rate == TESTED and kind == ALL:
+        ends = _ends(values, drives, steps, levels)
+    return Line(*about, rates, levels, ends, noise, tuple(steps), values, drives)
+
+
+def _ends(values: Floats, drives: pd.DataFrame, steps: Sequence[Step], levels: Floats) -> Floats:
+    """Return the ends of Student's interval over groups of drives around each run's level.
+
+    It is that of the drives' changes from their own means since the last step.
+    """
+    ends, group = np.full((2, len(values)), np.nan), drives["group"].factorize()[0]
+    member = group[:, None] == np.unique(group)
+    for begin, end in pairwise(sorted({0, *(step.run for step in steps), len(values)})):
+        there = ~np.isnan(values[begin:end])
+        rates = np.where(there, values[begin:end], 0)
+        away = np.where(there, rates - rates.sum(0) / np.maximum(there.sum(0), 1), 0)
+        with np.errstate(invalid="ignore"):
+            means = (away @ member) / (there @ member)
+        for run, of_groups in enumerate(means, begin):
+            defined = of_groups[~np.isnan(of_groups)]
+            if len(defined) >= LEAST_GROUPS:
+                interval = mean_distribution(defined, independent=True).interval(0.95)
+                ends[:, run] = levels[run] - defined.mean() + interval
+    return ends
+
+
+def _stretches(there: Flags) -> Iterator[Sums]:
+    """Yield the positions of runs of which each has a drive in common with an earlier one.
+
+    ``there`` is ``(T, D)``. Runs without any drive are left out.
+    """
+    runs: list[int] = []
+    known = np.zeros(there.shape[1], bool)
+    for run in np.flatnonzero(there.any(axis=1)).tolist():
+        if runs and not (known & there[run]).any():
+            yield np.array(runs)
+            runs, known = [], np.zeros_like(known)
+        runs.append(run)
+        known |= there[run]
+    if runs:
+        yield np.array(runs)
+
+
+Within = Callable[[Line, range, range], Difference]
+"""Returns the difference of a line within its only drive, from some runs to others, over frames."""
+
+
+def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> list[Change]:
+    """Return the steps in the order of their runs; those of ERR of masks are corrected together."""
+    changes = []
+    for line in lines:
+        for step in line.steps:
+            last = step.run if step.kind == "outlier" else step.after
+            # The end of a drift, whose beginning is like the level before.
+            first = last - (last - step.run) // 4 if step.kind == "drift" else step.run
+            runs = range(step.before, step.run), range(first, last + 1)
+            changes.append(Change(line, step, *_difference(line, *runs, confidence, within)))
+    tested = [n for n, c in enumerate(changes) if (c.line.kind, c.line.rate) == (ALL, TESTED)]
+    corrected = holm([changes[place].difference for place in tested])
+    for place, difference in zip(tested, corrected, strict=True):
+        changes[place] = changes[place]._replace(difference=difference)
+    return sorted(changes, key=lambda change: change.step.run)
+
+
+def _difference(
+    line: Line, before: range, after: range, confidence: float, within: Within
+) -> tuple[Difference, pd.DataFrame]:
+    """Return the change over the drives that are in some of both runs, and these drives."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a drive that is in none of the runs
+        old, new = (np.nanmean(line.drive_rates[[*runs]], axis=0) for runs in (before, after))
+    # Means of equal numbers may differ in their last digit.
+    rows = line.drives.assign(before=old, after=new, mean=(new - old).round(12))
+    rows = rows[rows["mean"].notna()]
+    rows = rows.iloc[np.argsort(-np.abs(rows["mean"].to_numpy()), kind="stable")]
+    difference = over_drives(rows, confidence, line.rate)
+    if len(rows) == 1 and line.kind == ALL:
+        difference = within(line, before, after)
+    return difference, rows
+
+
+def judge_last(
+    lines: Sequence[Line],
+    conditions: Sequence[Condition],
+    earlier: int,
+    settings: EvaluationSettings,
+    within: Within,
+) -> Iterator[Judgement]:
+    """Judge each condition on the last run, against the mean of so many ``earlier`` runs.
+
+    Its interval is widened by the noise of a run.
+    """
+    label, masks = "the last run", [line for line in lines if line.kind == ALL]
+    for condition in conditions:
+        name = f"{condition.stage}.{condition.variant}.{condition.rate}"
+        line = next((mask for mask in masks if mask.name == name), None)
+        if line is None or np.isnan(line.rates[-1]):
+            names = ", ".join(mask.name for mask in masks if not np.isnan(mask.rates[-1]))
+            yield condition.not_judged(label, f"it has no {name}; there are {names}")
+            continue
+        end = len(line.rates) - 1
+        runs = range(max(end - earlier, 0), end), range(end, end + 1)
+        difference, rows = _difference(line, *runs, settings.confidence, within)
+        if condition.is_change and not len(rows):
+            why = f"no drive of it was scored alike in the {earlier} runs before"
+            yield condition.not_judged(label, why)
+            continue
+        if difference.low is not None and difference.high is not None:
+            noise = 2 * line.noise * math.sqrt(1 + 1 / earlier)
+            ends = (difference.mean - difference.low, difference.high - difference.mean)
+            low, high = (math.hypot(end, noise) for end in ends)
+            mean = difference.mean
+            difference = replace(difference, low=mean - low, high=mean + high)
+        base, new = difference.mean and line.rates[-1] - difference.mean, line.rates[-1]
+        rate = condition.rate
+        about = label, line.variant, line.stage, True, len(rows), settings.least_frames
+        mask = MaskChange(*about, {rate: base}, {rate: float(new)}, {rate: difference})
+        yield condition.judge(mask)

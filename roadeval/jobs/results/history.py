@@ -1,0 +1,347 @@
+"""The history of many results: since when which rate is worse, and what changed then."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import lru_cache, partial
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE
+from roadeval.data.words import first_of, setting
+from roadeval.errors import RoadevalError
+from roadeval.evaluation.comparison.compare import changed_settings
+from roadeval.evaluation.comparison.conditions import Condition
+from roadeval.evaluation.comparison.history import (
+    MASK_RATES,
+    Line,
+    find_changes,
+    find_lines,
+    judge_last,
+)
+from roadeval.evaluation.comparison.pairing import common_masks
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.regions import ALL
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats.difference import Difference, within_drive
+from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
+from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.jobs.results.result import Result, local_path
+from roadeval.report.history import document, markdown
+from roadeval.report.writing import write_document
+from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
+from roadeval.results.history import Event, History, RunFacts, as_dict, group_changes
+from roadeval.results.schema import TAG
+from roadeval.results.tables import read_parquet, read_table
+from roadeval.runtime.files import Paths, list_paths
+from roadeval.runtime.text import visible
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+EARLIER: Final = 7
+"""Runs before the last one, with whose mean conditions compare it."""
+DETAILED: Final = 5
+"""Newest events of which frames are named."""
+FRAMES: Final = 5
+DRIVES: Final = 3
+"""Frames that are named of an event, and drives in which they are searched."""
+NEAR: Final = 10
+"""Runs on both sides of a step whose frames are compared, if there is one drive."""
+UNKNOWN: Final = "nothing that the results know of"
+BATCH: Final = 50
+"""Results whose tables are in memory together."""
+COLUMNS: Final[Mapping[str, Sequence[str]]] = {
+    "scores": (
+        *(*KEY, "variant", "stage", "final", "region", "frames", "TP", "FN", "N", "truth"),
+        *MASK_RATES,
+    ),
+    "drives": (*KEY, "name", "log_digest", "group", "status"),
+    "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
+}
+"""Columns that are read of each table of a fleet."""
+
+
+ReadFrames = Callable[[int, tuple[str, str]], "pd.DataFrame"]
+"""Returns the rows of ``frames`` of final masks, in a run by its number, on a drive."""
+
+
+def history(
+    results: Paths,
+    *,
+    by: str | None = None,
+    last: int = EARLIER,
+    fail_if: Sequence[str] = (),
+    on_progress: OnProgress = ignore,
+) -> History:
+    """Read many results as one history, and find which rate changed in which run.
+
+    A `RoadevalError` if fewer than two of them can be read; those that cannot are told.
+
+    Parameters
+    ----------
+    results
+        Results of drives or fleets, or folders with any number of them below.
+    by
+        A label (see ``--label``): results that share its value are one run. By default each is a
+        run. Runs are in the order in which they were made.
+    last
+        Number of runs before the last one whose mean ``fail_if`` compares it with.
+    fail_if
+        Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
+    """
+    conditions = [Condition.parse(text) for text in fail_if]
+    lost: list[str] = []
+    paths = [path for given in list_paths(results) for path in find_results(local_path(given))]
+    opened: dict[Path, Result] = {}
+    for path in paths:
+        try:
+            opened[path] = Result(path)
+            if not opened[path].complete:
+                raise RoadevalError("a partial recording, which is left out", where=path)
+        except RoadevalError as error:
+            opened.pop(path, None)
+            lost.append(error.sentence)
+    runs = _runs_in_order(opened, by, lost)
+    if len(runs) < 2:
+        remedy = lost[0] if lost else ""
+        problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
+        raise RoadevalError(problem, remedy=remedy)
+    numbered = [(n, opened[Path(path)]) for n, run in enumerate(runs) for path in run.paths]
+    rows = _read_rows(numbered, lost, on_progress)
+    masks = rows[~rows.duplicated(["run", *KEY])].groupby("run")["frames"].agg(["size", "sum"])
+    sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
+    runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
+    newest = Result(runs[-1].paths[0]).facts
+    settings, focus = newest.evaluation, newest.focus or ""
+    tags = {str(name): str(name)[len(TAG) :] for name in rows if str(name).startswith(TAG)}
+    lines = find_lines(rows, tags, len(runs))
+    read = lru_cache(4 * NEAR)(partial(_read_frames, runs))
+    within = partial(_within_drive, read, settings)
+    events = [
+        replace(event, reasons=[*_reasons(runs, event)] or [UNKNOWN])
+        for event in group_changes(find_changes(lines, settings.confidence, within), focus)
+    ]
+    for event in events[-DETAILED:]:
+        event.frames.extend(_changed_frames(read, event))
+    judged = judge_last(lines, conditions, last, settings, within)
+    return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
+
+
+def find_results(path: Path) -> list[Path]:
+    """Return a result's path, or those of the results below a folder, without linked folders.
+
+    Recordings count only if there is no folder of results. A `RoadevalError` if there is none.
+    """
+    if not path.is_dir() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
+        return [path]
+    folders, recordings = [], []
+    for folder, below, files in os.walk(path):
+        below.sort()
+        if SUMMARY in files or FLEET in files:
+            folders.append(Path(folder))
+            below.clear()
+        recordings += [Path(folder, name) for name in sorted(files) if name.endswith(".rrd")]
+    if not (folders or recordings):
+        remedy = "name a recording, a results folder, a fleet, or a folder above them"
+        raise RoadevalError("holds no results", where=path, remedy=remedy)
+    return folders or recordings
+
+
+def last_good(path: Path, besides: Sequence[Path]) -> Path:
+    """Return a result's path, or of a folder of runs the newest that no lasting step made worse.
+
+    Results ``besides`` are no runs of the folder.
+    """
+    taken = {other.resolve() for other in besides}
+    paths = [result for result in find_results(path) if result.resolve() not in taken]
+    return Path(history(paths).last_good.paths[0]) if len(paths) > 1 else (paths or [path])[0]
+
+
+def _runs_in_order(
+    opened: Mapping[Path, Result], by: str | None, lost: list[str]
+) -> list[RunFacts]:
+    """Return the runs by time; results without the label ``by`` are lost."""
+    groups: dict[str, list[tuple[Origin, str]]] = {}
+    origins = [(_origin(result, path), str(path)) for path, result in opened.items()]
+    for origin, path in sorted(origins, key=lambda one: (one[0].made_ns, one[1])):
+        if by and by not in origin.labels:
+            lost.append(f"{path}: has no label {by}")
+        else:
+            groups.setdefault(origin.labels[by] if by else path, []).append((origin, path))
+    times = [
+        datetime.fromtimestamp((members[0][0].made_ns or 0) / 1e9, UTC)
+        for members in groups.values()
+    ]
+    forms = ("%Y-%m-%d", "%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S")
+    distinct = (form for form in forms if len({f"{time:{form}}" for time in times}) == len(times))
+    form = next(distinct, forms[-1])
+    return [
+        RunFacts(
+            tuple(p for _, p in members), members[0][0], title=name if by else f"{time:{form}}"
+        )
+        for (name, members), time in zip(groups.items(), times, strict=True)
+    ]
+
+
+def _origin(result: Result, path: Path) -> Origin:
+    """Return how a result was made; its time is that of its file if it does not say."""
+    origin = result.facts.origin or Origin()
+    file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
+    made_ns = origin.made_ns or file.stat().st_mtime_ns
+    labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+    return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
+
+
+def _read_rows(
+    numbered: Sequence[tuple[int, Result]], lost: list[str], on_progress: OnProgress
+) -> pd.DataFrame:
+    """Return the rows of some results for `find_lines`, by the number of their run."""
+    fleets = [one for one in numbered if one[1].fleet]
+    batches = [fleets[begin : begin + BATCH] for begin in range(0, len(fleets), BATCH)]
+    batches += [[one] for one in numbered if not one[1].fleet]
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in COLUMNS}
+    done = 0
+    for batch in batches:
+        on_progress(Progress(done, len(numbered), "reading", unit="results"))
+        done += len(batch)
+        for name, tables in parts.items():
+            tables.extend(table for table in _read_batch(batch, name, lost) if len(table))
+    if not parts["scores"]:
+        raise RoadevalError(lost[0] if lost else "nothing was scored in any of the runs")
+    parts["classes"] = parts["classes"] or [read_table("classes", "").assign(run=0)]
+    # To concatenate a single table takes as long as reading it.
+    return _join_tables(*(concatenate(t) if len(t) > 1 else t[0] for t in parts.values()))
+
+
+def _read_batch(
+    batch: Sequence[tuple[int, Result]], name: str, lost: list[str]
+) -> Iterator[pd.DataFrame]:
+    """Yield a table of one drive, or of some fleets: together unless one of them is damaged."""
+    if name == "classes":
+        batch = [one for one in batch if not one[1].fleet or one[1].fleet.has_classes]
+    runs, files = [run for run, _ in batch], [r.paths[0] / f"{name}.parquet" for _, r in batch]
+    try:
+        if batch and batch[0][1].fleet is None:
+            rows = batch[0][1].table(name).assign(run=runs[0])
+        else:
+            rows = read_parquet(files, name, COLUMNS[name], runs)
+        is_scores = name == "scores"
+        yield rows[rows["final"] & (rows["variant"] != BASELINE)] if is_scores else rows
+    except RoadevalError as error:
+        if len(batch) == 1:
+            lost.append(error.sentence)
+        else:
+            yield from chain(*(_read_batch([one], name, lost) for one in batch))
+
+
+def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows for `find_lines` from tables of all runs."""
+    key = ["run", *KEY]
+    is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
+    classes = classes[is_class & (classes["pixels"] > 0)]
+    right = classes["road"] / classes["pixels"]
+    wrong = right.where(classes["truth"] == "other", 1 - right)
+    texts = classes["name"].astype(str)
+    part = texts.where(texts != "", "class " + classes["class"].astype(str))
+    of_classes = classes.assign(kind="class", part=part, ERR=wrong, N=classes["pixels"])
+    kind = np.where(scores["region"] == ALL, ALL, "region")
+    of_masks = scores.assign(kind=kind, part=scores["region"], road=scores["TP"] + scores["FN"])
+    about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
+    about = about.merge(only(scores, region=ALL)[[*key, "truth"]].drop_duplicates(key), on=key)
+    for other in ("log_digest", "drive"):
+        about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
+    names = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *MASK_RATES]
+    parts = [part.reindex(columns=names) for part in (of_masks, of_classes) if len(part)]
+    rows = concatenate(parts) if len(parts) > 1 else parts[0]
+    rows = rows.merge(about, on=key)
+    # Of a drive that a run has twice the later result counts.
+    return rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
+
+
+def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> pd.DataFrame:
+    """Return the rows of ``frames`` of final masks on a drive; none if they are gone."""
+    tables = [read_table("frames", "")]
+    for path in runs[run].paths:
+        with suppress(RoadevalError):
+            tables.append(Result(path).table("frames", [drive]))
+    return finals(concatenate(tables))
+
+
+def _within_drive(
+    read: ReadFrames, settings: EvaluationSettings, line: Line, before: range, after: range
+) -> Difference:
+    """Return the change of a line within its only drive, over frames, as `Within` does."""
+    (drive,) = line.drives[KEY].drop_duplicates().itertuples(index=False, name=None)
+    sides = []
+    for runs in (before[-NEAR:], after[:NEAR]):
+        rows = concatenate([only(read(run, drive), variant=line.variant) for run in runs])
+        sides.append(rows.groupby(["camera", "stamp_ns"], observed=True)[line.rate].mean())
+    pairs = sides[0].to_frame(f"{line.rate}_base").join(sides[1], how="inner").reset_index()
+    return within_drive(pairs, line.rate, settings)
+
+
+def _changed_frames(read: ReadFrames, event: Event) -> Iterator[tuple[str, int, float]]:
+    """Yield drive, number and change of the frames that changed most from the run before."""
+    line, worse = event.first.line, event.first.difference.mean > 0
+    for drive in event.first.drives[KEY].head(DRIVES).itertuples(index=False, name=None):
+        sides = (only(read(run, drive), variant=line.variant) for run in (event.run - 1, event.run))
+        pairs = common_masks(*sides)
+        pairs = pairs.assign(change=pairs[TESTED] - pairs[f"{TESTED}_base"])
+        rows = most_changed_frames(pairs, FRAMES, harmed=worse)
+        yield from zip(rows["drive"], rows["frame"], rows["change"], strict=True)
+
+
+def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
+    """Yield what differs between the run of an event, or the end of a drift, and the one before."""
+    step, line = event.first.step, event.first.line
+    places = event.run - 1, step.after if step.kind == "drift" else event.run
+    old, new = (runs[place] for place in places)
+    before, after = Result(*old.paths), Result(*new.paths)
+    parts: dict[str, tuple[Any, Any]] = {
+        "commit": (old.origin.commit[:12], new.origin.commit[:12]),
+        "uncommitted changes": (old.origin.dirty, new.origin.dirty),
+    }
+    drives = {drive.key: drive for drive in before.compared}
+    parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
+    named = [
+        {f"label {name}": value for name, value in run.origin.labels.items()}
+        | (facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version})
+        for run, facts in ((old, before.facts), (new, after.facts))
+    ]
+    parts |= {name: (named[0].get(name), value) for name, value in named[1].items()}
+    yield from (f"{k} {setting(a)} to {setting(b)}" for k, (a, b) in parts.items() if a != b)
+    had, has = (~np.isnan(line.drive_rates[place]) for place in places)
+    names = line.drives["drive"].to_numpy()
+    came, gone, kept = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
+    for title, which in (
+        ("new drives", came - gone),
+        ("drives that are gone", gone - came),
+        ("drives with other frames or another truth", (came & gone) - kept),
+    ):
+        if which:
+            yield f"{title}: {first_of(sorted(which), DRIVES)}"
+
+
+def write(history: History, path: Path) -> Path:
+    """Write a history as PDF, page, Markdown or JSON, by the file's ending.
+
+    A `RoadevalError` if the ending is another, or the file cannot be written.
+    """
+    return write_document(
+        *(path, "a history", lambda: document(history)),
+        lambda: markdown(history),
+        lambda: as_json(history),
+    )
+
+
+def as_json(history: History) -> str:
+    """Write a history as JSON; undefined numbers become null."""
+    return json_text(plain(as_dict(history)))

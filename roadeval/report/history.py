@@ -1,0 +1,190 @@
+"""The report of a history for a terminal, Markdown, paper and a page."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from typing import Final
+
+import numpy as np
+
+from roadeval.data.arrays import Floats
+from roadeval.data.words import DASH, counted, number, percent, points
+from roadeval.evaluation.comparison.history import Line
+from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.regions import ALL
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Command,
+    Details,
+    Figure,
+    Heading,
+    Report,
+    Table,
+    Text,
+    blocks_as_markdown,
+)
+from roadeval.report.captions import note
+from roadeval.report.chart import FAINT, WORSE, Chart, ChartKind, Look, Series, looks
+from roadeval.report.comparison import limits
+from roadeval.results.history import Event, History, describe_change, verdict
+from roadeval.results.sentences import marked_interval
+
+BARS: Final = "▁▂▃▄▅▆▇█"
+SPARKS: Final = 30
+"""Letters of a rate over the runs in a table."""
+ROWS: Final = 10
+"""Most drives of an event, and most parts of the pixels with a chart."""
+Rows = list[list[Cell | str]]
+
+
+def document(history: History) -> Report:
+    """Return a history as a document."""
+    runs = history.runs
+    lost = [BulletList("Left out", history.lost, "warning")] if history.lost else []
+    return Report(
+        kicker="roadeval history",
+        title=f"{counted(len(runs), 'run')}: {history.focus}",
+        subtitle=f"{runs[0].title} to {runs[-1].title}, {counted(runs[-1].drives, 'drive')} last",
+        footer=f"history of {history.focus}",
+        blocks=[
+            Heading("Since when"),
+            Text(verdict(history), "verdict"),
+            *limits(history.judgements),
+            *lost,
+            *(_details(history, event) for event in reversed(history.events)),
+            note("steps"),
+            Heading("Over the runs"),
+            *_figures(history),
+            Heading("All rates"),
+            rates_table(sorted(history.lines, key=lambda line: line.variant != history.focus)),
+            _drives_table(history),
+            Heading("The runs"),
+            _runs_table(history),
+        ],
+        keywords=["road recognition", "history"],
+    )
+
+
+def markdown(history: History) -> str:
+    """Return a history as Markdown."""
+    opened = (
+        [Heading(block.title, 2), *block.blocks] if isinstance(block, Details) else [block]
+        for block in document(history).blocks
+    )
+    return f"# roadeval history\n\n{blocks_as_markdown(chain.from_iterable(opened))}"
+
+
+def rates_table(lines: Sequence[Line]) -> Table:
+    """Tabulate lines: their rates in the first and the last run, and their levels between."""
+    rows: Rows = [
+        [line.variant, line.title, *_over_runs(line.rates, line.levels)] for line in lines
+    ]
+    columns = ["variant", "rate", "first %", "last %", "over the runs"]
+    breaks = [n for n, row in enumerate(rows) if n and row[0] != rows[n - 1][0]]
+    return Table(columns, rows, text_columns=(0, 1, 4), breaks=breaks, small=True)
+
+
+def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
+    """Return the first and the last rate, and bars for the runs, from the least to the greatest.
+
+    Runs that share a bar are its mean; a run without a level is a space.
+    """
+    defined = rates[~np.isnan(rates)]
+    if not len(defined):
+        return DASH, DASH, ""
+    parts = [part[~np.isnan(part)] for part in np.array_split(levels, min(SPARKS, len(levels)))]
+    means = np.array([part.mean() if len(part) else np.nan for part in parts])
+    low, high = np.nanmin(means), np.nanmax(means)
+    # Bars of a rate that stays are low, whatever the rounding.
+    places = np.nan_to_num((means - low) / max(high - low, 1e-4) * (len(BARS) - 1)).round()
+    bars = [" " if np.isnan(m) else BARS[int(p)] for m, p in zip(means, places, strict=True)]
+    return percent(float(defined[0])), percent(float(defined[-1])), "".join(bars)
+
+
+def _figures(history: History) -> Iterator[Block]:
+    """Yield charts of the levels: of all pixels, then of what moved most."""
+    masks = [line for line in history.lines if line.kind == ALL]
+    by_rate = {rate: [m for m in masks if m.rate == rate] for rate in (m.rate for m in masks)}
+    yield Figure([_chart(history, rate, lines) for rate, lines in by_rate.items()], "")
+    yield note("levels")
+    parts = [m for m in history.lines if m.kind != ALL and m.variant == history.focus and m.steps]
+    parts.sort(key=lambda line: float(np.nanmin(line.levels) - np.nanmax(line.levels)))
+    if parts:
+        yield Heading(f"Where {history.focus} changed most", 2)
+        yield Figure([_chart(history, line.title, [line]) for line in parts[:ROWS]], "")
+
+
+def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
+    """Return a chart of the levels of some lines over the runs, with the steps as marks."""
+    by_variant, series = looks([line.variant for line in lines]), []
+    places, names = range(len(history.runs)), [run.title for run in history.runs]
+    for line in lines:
+        ends = [(100 * end).tolist() for end in line.ends]
+        level = (100 * line.levels).tolist()
+        series.append(Series(line.variant, by_variant[line.variant], places, level, *ends))
+        for step in line.steps:
+            look = Look(WORSE if step.change > 0 else FAINT, mark="triangle")
+            title_of_step = f"{step.kind} of {line.variant}, {names[step.run]}"
+            series.append(Series(title_of_step, look, [step.run], [level[step.run]]))
+    return Chart(title, ChartKind.LINES, series, names=names, from_zero=False)
+
+
+def _details(history: History, event: Event) -> Details:
+    """Return what an event changed, what else differs there, and the drives that carry it."""
+    first, run = event.first, history.runs[event.run]
+    blocks: list[Block] = [BulletList("What changed there", event.reasons)] if event.reasons else []
+    changes: Rows = [
+        [c.line.variant, c.line.title, points(c.difference.mean), marked_interval(c.difference)]
+        for c in event.changes
+    ]
+    columns = ["variant", "rate", "change", "interval"]
+    blocks.append(Table(columns, changes, text_columns=(0, 1), small=True))
+    carrying = first.drives[first.drives["mean"] != 0].head(ROWS)
+    drives: Rows = [
+        [row["drive"], percent(row["before"]), percent(row["after"]), points(row["mean"])]
+        for row in carrying.to_dict("records")
+    ]
+    title = f"{first.line.title} of the drives that changed most"
+    columns = ["drive", "before %", "after %", "change"]
+    blocks.append(Table(columns, drives, caption=title, small=True))
+    if event.frames:
+        frames: Rows = [
+            [drive, str(frame), points(change)] for drive, frame, change in event.frames
+        ]
+        title = "Frames that changed most"
+        blocks.append(Table(["drive", "frame", "change of ERR"], frames, caption=title, small=True))
+    paths = [history.runs[place].paths[0] for place in (event.run - 1, event.run)]
+    blocks.append(Command(shlex.join(["roadeval", "compare", *paths])))
+    return Details(f"{run.name}: {describe_change(first)}", blocks)
+
+
+def _drives_table(history: History) -> Details:
+    """Return the error rate of the focus on each drive, run by run."""
+    rows: Rows = []
+    lines = (
+        m for m in history.lines if (m.variant, m.kind, m.rate) == (history.focus, ALL, TESTED)
+    )
+    for line in lines:
+        for drive, places in line.drives.reset_index(drop=True).groupby("drive").groups.items():
+            rates = line.drive_rates[:, places]
+            there = ~np.isnan(rates)
+            means = np.where(there, rates, 0).sum(axis=1) / np.where(
+                there.any(1), there.sum(1), np.nan
+            )
+            rows.append([str(drive), *_over_runs(means, means)])
+    columns = ["drive", "first %", "last %", "over the runs"]
+    table = Table(columns, rows, text_columns=(0, 3), small=True, find="Find drives:")
+    return Details(f"{TESTED} of {history.focus} on each drive", [table], on_paper=False)
+
+
+def _runs_table(history: History) -> Table:
+    rows: Rows = []
+    for run in reversed(history.runs):
+        labels = ", ".join(f"{name}={value}" for name, value in run.origin.labels.items())
+        rows.append([run.name, labels, number(run.drives), number(run.frames), run.paths[0]])
+    columns = ["run", "labels", "drives", "frames", "result"]
+    return Table(columns, rows, text_columns=(0, 1, 4), small=True, find="Find runs:")
