@@ -24,8 +24,7 @@ def _labels(labels: object) -> object:
 
     for name, text in labels.items() if isinstance(labels, Mapping) else ():
         if not is_plain(name) or not 0 < len(str(text)) <= 500 or not str(text).isprintable():
-            problem = "must be lines of at most 500 letters, with names of letters, digits, - and _"
-            raise ValueError(problem)
+            raise ValueError("must be of letters, digits, - and _, and after = a line of up to 500")
     return labels
 
 

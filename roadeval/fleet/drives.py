@@ -53,19 +53,16 @@ def is_url(source: str) -> bool:
 
 def scheme_of(url: str) -> str:
     """Return the scheme of a URL; a `FleetError` if it is none of `SCHEMES`, or has no host."""
-    match = _URL.match(url)
-    scheme = match[1].lower() if match else ""
+    scheme = url.partition("://")[0].lower()
     if scheme not in SCHEMES:
         remedy = f"choose {', '.join(f'{scheme}://' for scheme in SCHEMES)}"
         raise FleetError("an unknown scheme", where=public_source(url), remedy=remedy)
-    if scheme in ("https", "http"):
-        try:
-            has_host = bool(urlsplit(url).hostname)
-        except ValueError:
-            has_host = False
-        if not has_host:
-            raise FleetError("no host in it", where=public_source(url))
-    return scheme
+    if scheme in BUCKETS:
+        return scheme
+    with suppress(ValueError):
+        if urlsplit(url).hostname:
+            return scheme
+    raise FleetError("no host in it", where=public_source(url))
 
 
 def public_source(source: str) -> str:

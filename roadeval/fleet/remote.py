@@ -1,4 +1,4 @@
-"""Drives in object stores and on web servers, which are read in parts and checked for changes.
+"""Drives and results in object stores and on web servers, which are checked for changes.
 
 obstore reads them. For ``s3://`` and ``gs://`` it takes credentials, endpoint and region from the
 environment, as ``AWS_ACCESS_KEY_ID``, ``AWS_ENDPOINT_URL``, ``AWS_ALLOW_HTTP`` for an endpoint
@@ -13,15 +13,19 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+import zlib
 from base64 import b64encode
 from collections.abc import Callable
 from concurrent.futures import wait
-from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import cache, partial
 from os import PathLike
 from pathlib import Path
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
+from zipfile import BadZipFile, ZipFile, is_zipfile
 
 from roadeval.fleet.drives import (
     BUCKETS,
@@ -33,6 +37,7 @@ from roadeval.fleet.drives import (
     scheme_of,
 )
 from roadeval.logs.log import RemoteLog
+from roadeval.results.facts import FETCHED, FLEET, SUMMARY
 from roadeval.runtime.threads import in_thread
 
 if TYPE_CHECKING:
@@ -45,6 +50,10 @@ PATIENCE_S: Final = 20.0
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 PART: Final = 64 << 10
 """Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
+ROOM: Final = 2 << 30
+"""Bytes of a result that are fetched, and unpacked, at most."""
+TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
+_home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # until the process ends
 _POLL_S: Final = 0.2
 """Seconds between two checks for an answer."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
@@ -79,6 +88,41 @@ def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> P
     name, place = Path(file_name(source)), _open_store(source, patience_s)
     file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
     return RemoteLog(public_source(source), name, file)
+
+
+@cache
+def fetch_result(url: str) -> Path:
+    """Fetch the recording, or the zip of a result, behind a URL whole, and return its path.
+
+    A `FleetError` if it cannot be fetched or unpacked, or has more than `ROOM` bytes.
+    """
+    if is_url(url) and url.endswith("/"):
+        remedy = "name a recording, or a zip"
+        raise FleetError("a folder is not fetched", where=public_source(url), remedy=remedy)
+    remote = open_source(url)
+    if isinstance(remote, Path):
+        return remote
+    path = Path(mkdtemp(dir=_home().name), remote.path)
+    try:
+        if remote.file.seek(0, os.SEEK_END) > ROOM:
+            raise ValueError(TOO_LARGE)
+        remote.file.seek(0)
+        with path.open("wb") as file:
+            shutil.copyfileobj(remote.file, file, 8 << 20)
+        if is_zipfile(path):
+            with ZipFile(path) as archive:  # a file takes at least a block
+                if sum(entry.file_size + 4096 for entry in archive.infolist()) > ROOM:
+                    raise ValueError(TOO_LARGE)
+                archive.extractall(unpacked := path.parent / "unpacked" / path.stem)
+            kinds = ([*unpacked.rglob(name)] for name in (FLEET, SUMMARY, "*.rrd"))
+            files = next(filter(None, kinds), [])
+            if len(files) != 1:
+                raise ValueError(f"it holds {len(files) or 'no'} results")
+            path = files[0] if files[0].suffix == ".rrd" else files[0].parent
+    except (OSError, ValueError, RuntimeError, EOFError, BadZipFile, zlib.error) as error:
+        raise FleetError(f"cannot be used: {error}", where=remote.source) from error
+    FETCHED[path] = remote.source
+    return path
 
 
 def file_name(url: str) -> str:
@@ -172,8 +216,7 @@ def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:
     return _state_of(_open_store(url, patience_s))[:2]
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """The place of an object: its store, and its key there."""
 
     url: str

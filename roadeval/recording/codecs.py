@@ -236,15 +236,11 @@ def _reduce(array: Array) -> Array:
     height, width = array.shape[:2]
     block = max(2, -(-width // COLUMNS))
     size = -(-width // block), -(-height // block)
-    small: Array = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
-    return small
+    return cv2.resize(array, size, interpolation=cv2.INTER_AREA)
 
 
 def _restore(array: Array, width: int, height: int) -> Array:
-    if array.shape[:2] == (height, width):
-        return array
-    full: Array = cv2.resize(array, (width, height))
-    return full
+    return array if array.shape[:2] == (height, width) else cv2.resize(array, (width, height))
 
 
 def _jpeg(rgb: Array) -> bytes:

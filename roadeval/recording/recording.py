@@ -103,7 +103,7 @@ class Recording:
         if (listed := self._file.document(at.SHOWN)) is not None:
             with name_damage(self.path, at.SHOWN):
                 shown = {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
-            if not self._file.span(at.CAMERA).holds_all(shown):
+            if not all(map(self._file.span(at.CAMERA).holds, shown)):
                 raise RecordingError(
                     "lacks images of frames that it lists: it is a part, as `rerun rrd split` "
                     "makes it",

@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import struct
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf
-from operator import itemgetter
+from operator import attrgetter
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
 
@@ -68,10 +68,6 @@ class FrameSpan(NamedTuple):
         """Return whether a frame is one of them."""
         return self.first <= frame <= self.last
 
-    def holds_all(self, frames: Collection[int]) -> bool:
-        """Return whether all of these frames are among them."""
-        return not frames or (self.holds(min(frames)) and self.holds(max(frames)))
-
 
 ALWAYS: Final = FrameSpan()
 """The span of data that was logged once, for every frame."""
@@ -103,16 +99,14 @@ class RrdFile:
         self._images: dict[str, tuple[FrameSpan, dict[int, pa.ListScalar]]] = {}
         """The images of the message that was read last, by frame, of each entity."""
         messages, self.indexed = _find_messages(path)
-        spans = [
-            (message.span.first, message.offset, message) for message in messages if message.span
-        ]
-        if len(spans) < len(messages) and all(first == -inf for first, *_ in spans):
+        framed = [message for message in messages if message.span]
+        if len(framed) < len(messages) and all(message.span == ALWAYS for message in framed):
             raise RecordingError(
                 f"its timeline {FRAME} was dropped",
                 where=path,
                 remedy="give the recording as it was made",
             )
-        for _, _, message in sorted(spans, key=itemgetter(0, 1)):
+        for message in sorted(framed, key=attrgetter("span.first", "offset")):
             self.messages[message.path].append(message)
 
     def _framed(self, path: str) -> dict[StoredMessage, FrameSpan]:
@@ -256,10 +250,8 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
                 )
             indexed_stores = _read_index(file)
             stores = _scan(file) if indexed_stores is None else indexed_stores
-            recordings, made_by = (
-                defaultdict[bytes, list[StoredMessage]](list),
-                "an unknown program",
-            )
+            recordings = defaultdict[bytes, list[StoredMessage]](list)
+            made_by = "an unknown program"
             for store, messages in stores:
                 fields = dict(protobuf_fields(store))
                 application = bytes(dict(protobuf_fields(fields[3]))[1]).decode()
@@ -306,10 +298,8 @@ def _read_index(file: IO[bytes]) -> Stores | None:
     for _, part in protobuf_fields(index):
         store = dict(protobuf_fields(part))
         listed = dict(protobuf_fields(store[_INDEX]))
-        content, *packing = (
-            listed[number] for number in (_LISTED_CONTENT, _LISTED_COMPRESSION, _LISTED_SIZE)
-        )
-        batch = _decompress(content, *packing)
+        packed = (listed[field] for field in (_LISTED_CONTENT, _LISTED_COMPRESSION, _LISTED_SIZE))
+        batch = _decompress(*packed)
         ends = [name for name in (f"{FRAME}:start", f"{FRAME}:end") if name in batch.schema.names]
         columns = (batch.column(name).to_pylist() for name in (*chunk, *ends))
         messages = [
@@ -337,11 +327,9 @@ def _scan(file: IO[bytes]) -> Iterator[tuple[memoryview, list[StoredMessage]]]:
         if kind == _ROWS:
             message = file.read(size)
             path, batch = rows_of(message)
-            timed = any(
-                (column.metadata or {}).get(b"rerun:kind") == b"index" for column in batch.schema
-            )
+            kinds = [(column.metadata or {}).get(b"rerun:kind") for column in batch.schema]
             frames = batch.column(FRAME).to_pylist() if FRAME in batch.schema.names else ()
-            span = _span(frames) if timed else ALWAYS
+            span = _span(frames) if b"index" in kinds else ALWAYS
             store = dict(protobuf_fields(memoryview(message)))[_STORE]
             yield store, [StoredMessage(path, offset, size, span)]
         offset += size + _HEADER.size

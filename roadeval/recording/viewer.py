@@ -114,10 +114,8 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
     while time.monotonic() < deadline:
         if process.poll() is not None:
             os.lseek(log, 0, os.SEEK_SET)
-            lines = os.read(log, 1 << 20).decode(errors="replace").split("\n")
-            last = next(
-                (line.strip() for line in reversed(lines) if line.strip()), "it printed nothing"
-            )
+            lines = os.read(log, 1 << 20).decode(errors="replace").strip().split("\n")
+            last = lines[-1].strip() or "it printed nothing"
             raise RecordingError(f"the viewer did not start: {last}")
         try:
             client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")

@@ -350,6 +350,7 @@ _VARIANTS: Final[Mapping[str, Colour]] = {
     UNFILTERED: colours.UNFILTERED,
     BASELINE: colours.BLIND,
 }
+_MARKDOWN: Final = rr.MediaType.MARKDOWN
 _STAGES: Final = (colours.ORANGE, *colours.EXTRA)
 _STATES: Final[Mapping[str, Colour]] = {
     Health.OK: colours.GREEN,
@@ -539,10 +540,6 @@ def _results(texts: Mapping[str, str]) -> StaticData:
     yield from ((f"/results/{name}", [rr.TextDocument(text)]) for name, text in texts.items())
 
 
-def _markdown(text: str) -> rr.TextDocument:
-    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
-
-
 def _line(name: str, colour: Colour) -> rr.SeriesLines:
     return rr.SeriesLines(names=name, colors=colour, widths=2.0)
 
@@ -567,9 +564,10 @@ def _guides(layout: Layout, summary: Mapping[str, Any]) -> StaticData:
         drive = [f"{rate} {percent(rates[rate])} %" for rate in SHORT if rate in rates]
         parts = [f"**{name}**", "  \n".join(["Drive:", *drive] if drive else [])]
         parts.append(as_markdown(variant.title))
-        yield f"{at.GUIDE}/{variant.name}", [_markdown("\n\n".join(filter(None, parts)) + "\n")]
+        text = "\n\n".join(filter(None, parts)) + "\n"
+        yield f"{at.GUIDE}/{variant.name}", [rr.TextDocument(text, media_type=_MARKDOWN)]
 
 
 def _guide(drive: str, verdict: str, *parts: str) -> tuple[str, list[Any]]:
     text = [f"### {as_markdown(drive)}", "", as_markdown(verdict), "", *parts]
-    return at.GUIDE, [_markdown("\n".join(text))]
+    return at.GUIDE, [rr.TextDocument("\n".join(text), media_type=_MARKDOWN)]

@@ -1,7 +1,6 @@
 """Text and charts of a comment on a pull request, and a badge.
 
-GitHub and GitLab look for mentions, issues and addresses after they have read the Markdown, where a
-backslash helps no more. In code they find none.
+Sites seek mentions, issues and addresses in what Markdown became: no backslash helps, code does.
 """
 
 from __future__ import annotations
@@ -9,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from html import escape
-from itertools import accumulate
 from typing import Final
 
 from roadeval.data.words import defined, percent, plain_points
@@ -17,7 +15,7 @@ from roadeval.evaluation.comparison.compare import Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, blocks_as_markdown
-from roadeval.report.chart import BETTER, FAINT, WORSE
+from roadeval.report.chart import BETTER, WORSE
 from roadeval.results.sentences import is_sure
 from roadeval.runtime.text import elide
 
@@ -32,13 +30,16 @@ _ALIVE: Final = re.compile(
 
 def fit(blocks: Iterable[Block], most: int = PART) -> str:
     """Return the first lines of blocks, in which no name pings anybody or links anywhere."""
-    text = re.sub(r"\S{99,}", lambda word: elide(word[0], 60), blocks_as_markdown(blocks))
-    text = "\n".join(elide(line, 1500) for line in text.split("\n"))
-    lines = _ALIVE.sub(lambda word: in_code(re.sub(r"\\(.)", r"\1", word[0])), text).split("\n")
-    sizes = accumulate(len(line.encode()) + 1 for line in lines)
-    shown = sum(size <= most for size in sizes)
-    left = f"\n\n*Left out here: {len(lines) - shown} lines.*" if shown < len(lines) else ""
-    return re.sub(r"(?<=\w) \\> ", " > ", "\n".join(lines[:shown]).strip()) + left + "\n"
+    lines, shown = blocks_as_markdown(blocks).split("\n"), list[str]()
+    for line in lines:
+        short = elide(re.sub(r"\S{99,}", lambda word: elide(word[0], 60), line), 1500)
+        inert = _ALIVE.sub(lambda word: in_code(re.sub(r"\\(.)", r"\1", word[0])), short)
+        most -= len(inert.encode()) + 1
+        if most < 0:
+            shown.append(f"\n*Left out here: {len(lines) - len(shown)} lines.*")
+            break
+        shown.append(re.sub(r"(?<=\w) \\> ", " > ", inert))
+    return "\n".join(shown).strip() + "\n"
 
 
 def in_code(text: str) -> str:
@@ -48,13 +49,12 @@ def in_code(text: str) -> str:
 
 def levels(pairs: Sequence[tuple[float, float]]) -> str:
     """Return percents of base and new as a chart of Mermaid; empty for less than two."""
-    pairs = [pair for pair in pairs if all(map(defined, pair))]
-    pairs = pairs[:: -(-len(pairs) // POINTS) or 1]
+    pairs = [pair for pair in pairs if all(map(defined, pair))][:: len(pairs) // POINTS + 1]
     if len(pairs) < 2:
         return ""
     bars, line = ([round(y, 2) for y in row] for row in zip(*pairs, strict=True))
     axis = f'y-axis "ERR in percent" 0 --> {max(*bars, *line, 1)}'
-    return _mermaid("", 300, (FAINT, BETTER), axis, f"bar {bars}", f"line {line}")
+    return _mermaid("", 300, ("#aaaaaa", BETTER), axis, f"bar {bars}", f"line {line}")
 
 
 def changes(rows: Sequence[tuple[str, float]]) -> str:
@@ -79,7 +79,8 @@ def _mermaid(kind: str, height: int, colours: Sequence[str], *lines: str) -> str
 
 def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskChange, str, str]:
     """Return the final mask that is surely worst, its ERR, and whether it is better or worse."""
-    by_mask = [(is_sure(row.difference[TESTED]), row) for row in comparison.finals()]
+    masks = comparison.finals() or comparison.changes
+    by_mask = [(is_sure(row.difference[TESTED]), row) for row in masks]
     sure, mask = max(by_mask, key=lambda pair: (pair[0], pair[1].difference[TESTED].mean))
     mean = mask.difference[TESTED].mean
     failed = any(limit.holds is not False for limit in limits) or (sure and mean > 0)
@@ -92,7 +93,7 @@ def badge(comparison: Comparison, limits: Sequence[Judgement]) -> str:
     """Return ERR and its change as SVG, with a title for screen readers."""
     _, text, tone = standing(comparison, limits)
     title, shown = escape(elide(f"ERR of {text}, {tone}", 200)), text.rpartition(": ")[2]
-    colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 7 * len(shown)
+    colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 6 * len(shown)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width + 48}" height="20" role="img">'
         f'<title>{title}</title><rect width="36" height="20" fill="#333"/><rect x="36" '

@@ -40,7 +40,7 @@ from roadeval.results.facts import (
     check_format,
     is_fleet,
 )
-from roadeval.results.folder import ResultsFolder
+from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.over_drives import summarise
 from roadeval.results.rows import (
     Key,
@@ -68,7 +68,6 @@ from roadeval.runtime.text import is_utf8, visible
 if TYPE_CHECKING:
     import pandas as pd
 
-RUN: Final = "run.toml"
 WRITTEN: Final = (*OF_DRIVES, "classes")
 """The tables of all drives in one file; older fleets have no ``classes``."""
 FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
@@ -185,17 +184,15 @@ class FleetFolder:
         """The folder's name."""
         return self.path.resolve().name
 
-    def table(
-        self, name: str, drives: Collection[str] | None = None, columns: Collection[str] = ()
-    ) -> pd.DataFrame:
-        """Read a table of all drives, or of some of them, of a file all columns or some.
+    def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
+        """Read a table of all drives, or of some of them.
 
         The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and those of
         `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
         of final masks.
         """
         if name in OF_DRIVES or (self.has_classes and name == "classes"):
-            rows = read_parquet([self.path / f"{name}.parquet"], name, columns)
+            rows = read_parquet([self.path / f"{name}.parquet"], name)
             return rows if drives is None else rows[rows["drive"].isin([*drives])]
         scored = self.drives["drive"][self.drives["evaluated"].fillna(0) > 0]
         chosen = [drive for drive in scored if drives is None or drive in drives]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from roadeval.data.words import counted, interval, percent, points
+from roadeval.data.words import counted, defined, interval, percent, points
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.comparison.history import Change, Line
 from roadeval.evaluation.metrics import TESTED
@@ -133,7 +133,11 @@ def verdict(history: History) -> str:
     count, focus = counted(len(history.runs), "run"), history.focus
     of_focus = [event for event in history.events if event.first.line.variant == focus]
     if not of_focus:
-        return f"{focus} did not change in {count}."
+        masks = (line for line in history.lines if (line.variant, line.kind) == (focus, ALL))
+        there = max((sum(map(defined, line.rates.tolist())) for line in masks), default=0)
+        if there < 2:
+            return f"{focus} is in {there} of {count}, which tells no change."
+        return f"{focus} did not change in {counted(there, 'run')}."
     standing = history.standing
     ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or of_focus[-1:]
     first = ranked[0].first
@@ -142,9 +146,10 @@ def verdict(history: History) -> str:
     most = max(parts, key=lambda part: abs(part.difference.mean), default=first)
     if abs(most.difference.mean) > 1.5 * abs(first.difference.mean):
         text += f"; most of all {most.line.title} ({points(most.difference.mean)})"
+    text += f". Changed there: {'; '.join(ranked[0].reasons[:2])}"
     if not standing:
-        return f"{text}: the last change in {count}."
-    more = f", as {len(ranked) - 1} more changes to the worse" if len(ranked) > 1 else ""
+        return f"{text}. It is the last change in {count}."
+    more = f", nor {counted(len(ranked) - 1, 'other rise')}" if len(ranked) > 1 else ""
     return f"{text}. No later run has undone it{more}."
 
 

@@ -181,8 +181,7 @@ def table_of_scores(
     import pandas as pd
 
     by = [*KEY, *MASK]
-    truth = group_rows(frames, by)["truth"].sum()  # it wraps around; the order does not matter
-    masks = totals(frames, by).assign(truth=truth).reset_index()
+    masks = totals(frames, by).assign(truth=group_rows(frames, by)["truth"].sum()).reset_index()
     masks = masks.assign(region=ALL, final=is_final)
     parts = totals(regions[regions["N"] > 0], [*by, "region"]).reset_index()
     parts = parts.merge(masks[[*by, "final"]], on=by).assign(truth=0)

@@ -114,10 +114,8 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
     parsed = csv.read_csv(BytesIO(content), convert_options=options)
     if not content.endswith(b"\n"):
         raise ValueError("its last line is cut off")
-    parsed = _with_later(parsed, table.names)
     complete = [c.name for c in table.columns if c.kind not in (Kind.RATE, Kind.NUMBER)]
-    _check_columns(parsed, table.columns, complete)
-    parsed = parsed.unify_dictionaries()
+    parsed = _check_columns(parsed, table.columns, complete).unify_dictionaries()
     for column in (column for column in table.columns if column.is_word):
         names = _words_of(parsed[column.name])
         if len(names) > (WORDS if column.kind is Kind.NAME else 10 * WORDS):
@@ -129,30 +127,24 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
     return parsed
 
 
-def _with_later(rows: pa.Table, names: Sequence[str]) -> pa.Table:
-    """Return rows with those columns of `LATER` that they must have and lack."""
+def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Container[str]) -> pa.Table:
+    """Return rows with the columns of `LATER`; a ValueError if others, or values, are lacking."""
     import pyarrow as pa
 
-    for name in sorted({*names} & {*LATER} - {*rows.column_names}):
+    for name in sorted({*LATER} & {column.name for column in columns} - {*rows.column_names}):
         rows = rows.append_column(name, pa.array(np.zeros(len(rows), np.int64)))
-    return rows
-
-
-def _check_columns(table: pa.Table, columns: Sequence[Column], complete: Container[str]) -> None:
-    """Raise a ValueError unless a table has all columns, and values in the ``complete`` ones."""
-    import pyarrow as pa
-
-    if len({*table.column_names}) < len(table.column_names):
+    if len({*rows.column_names}) < len(rows.column_names):
         raise ValueError("a column is there twice")
-    if missing := [column.name for column in columns if column.name not in table.column_names]:
+    if missing := [column.name for column in columns if column.name not in rows.column_names]:
         raise ValueError(f"no column {', '.join(missing)}")
-    for name, cells, kind in ((c.name, table[c.name], c.kind) for c in columns):
+    for name, cells, kind in ((c.name, rows[c.name], c.kind) for c in columns):
         expected = pa.type_for_alias(TYPES[kind])
         is_dictionary = pa.types.is_dictionary(cells.type)
         if (cells.type.value_type if is_dictionary else cells.type) != expected:
             raise ValueError(f"column {name} is not of type {expected}")
         if cells.null_count and name in complete:
             raise ValueError(f"column {name} lacks a value")
+    return rows
 
 
 def _words_of(cells: pa.ChunkedArray) -> list[str]:
@@ -228,11 +220,9 @@ def read_parquet(
             read_parquet([path], name, columns)  # the damaged one is named
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
-    counts = [name for name in table.column_names if table[name].type == pa.int64()]
-    whole = [name for name in counts if not table[name].null_count]
-    kinds = {} if len(whole) == len(counts) else {pa.int64(): pd.Int64Dtype()}
-    rows: pd.DataFrame = table.to_pandas(types_mapper=kinds.get)
-    return rows.astype(dict.fromkeys(whole, np.int64)) if kinds and whole else rows
+    rows: pd.DataFrame = table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
+    counts = [n for n in rows if rows[n].dtype == "Int64" and not rows[n].hasnans]
+    return rows.astype(dict.fromkeys(counts, np.int64)) if counts else rows
 
 
 def _read_files(
@@ -249,6 +239,7 @@ def _read_files(
     names = [column.name for column in columns]
     words = [column.name for column in columns if column.is_word]
     parts, of_drives = [], table.name == "drives"
+    complete = ("drive", "name", "status") if of_drives else words
     for place, path in enumerate(paths):
         check_input(path)
         metadata = parquet.read_metadata(path)
@@ -259,13 +250,12 @@ def _read_files(
         ) as file:
             tags = [n for n in file.schema_arrow.names if of_drives and n.startswith(TAG)]
             part = file.read([*names, *tags] if chosen else None, use_threads=False)
-            parts.append(_with_later(part, names))
+            parts.append(_check_columns(part, columns, complete))
             if runs:
                 run = np.full(len(part), runs[place])
                 parts[-1] = parts[-1].append_column("run", pa.array(run))
     rows = pa.concat_tables(parts or [table.arrow().empty_table()], promote_options="default")
     rows = rows.unify_dictionaries()
-    _check_columns(rows, columns, ("drive", "name", "status") if of_drives else words)
     for cells in (rows[word] for word in words if pa.types.is_dictionary(rows[word].type)):
         texts = _words_of(cells)
         if any(len(text) > LONG for text in texts):  # many rows may have one

@@ -7,21 +7,15 @@ import re
 import subprocess
 from typing import Any, Final
 
-_STATUS: Final = (
-    "git -c core.fsmonitor=false status --porcelain=v2 --branch --untracked-files=no "
-    "--ignore-submodules=dirty"
-)
+_ASK: Final = "git -c core.fsmonitor=false status --porcelain=v2 -b -uno --ignore-submodules=dirty"
 
 
 def current_commit(patience_s: float = 3.0) -> tuple[str, bool]:
-    """Return git's current commit, and whether tracked files differ from it.
-
-    The commit is empty without a repository or git, and if git does not answer.
-    """
+    """Return git's commit, and whether tracked files differ; empty if git does not answer."""
     quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0", "GIT_NO_LAZY_FETCH": "1"}
     how: Any = {"stdin": subprocess.DEVNULL, "capture_output": True, "env": quiet}
     try:
-        answer = subprocess.run(_STATUS.split(), check=True, timeout=patience_s, **how).stdout
+        answer = subprocess.run(_ASK.split(), check=True, timeout=patience_s, **how).stdout
     except (OSError, subprocess.SubprocessError):
         return "", False
     status = re.match(rb"# branch\.oid ([0-9a-f]{40,64})\n(?:#.*\n)*(.?)", answer)

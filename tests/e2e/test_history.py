@@ -1,4 +1,4 @@
-"""``roadeval history`` of thirty nights of the demo, the last nine of them with a bad commit."""
+"""``roadeval history`` of thirty nights of a small drive, the last nine with a bad commit."""
 
 import json
 import shutil
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.commands import DEMO, here, replay
+from tests.e2e.commands import here, replay
+from tests.fixtures.make import make
 
 DAY_NS = 86_400 * 10**9
 GOOD, BAD = "a" * 40, "bad" * 13 + "b"
@@ -21,15 +22,15 @@ def made_at(folder: Path, night: int, commit: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def nights(demo, tmp_path_factory) -> Path:
+def nights(street, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("nights") / "nightly"
-    options = ("--record", "none", "--config", demo.reports / "run.toml")
     setting = folder.with_name("bad.toml")
-    setting.write_text((demo.reports / "run.toml").read_text().replace("c = 1.0", "c = 0.001"))
-    bad = replay(folder.with_name("bad"), DEMO, *options[:2], "--config", setting)
+    setting.write_text((street.reports / "run.toml").read_text().replace("c = 1.0", "c = 0.001"))
+    drive = make("drives/street.mcap", folder.with_name("drives"))
+    bad = replay(folder.with_name("bad"), drive, "--record", "none", "--config", setting)
     assert bad.run.returncode == 0, bad.run.stderr
     for night in range(30):
-        source = bad.reports if night > 20 else demo.reports
+        source = bad.reports if night > 20 else street.reports
         shutil.copytree(source, folder / f"{night:02}", ignore=shutil.ignore_patterns("fig*"))
         made_at(folder / f"{night:02}", night, BAD if night > 20 else GOOD)
     return folder
@@ -52,25 +53,23 @@ def test_the_bad_commit_is_named_on_terminal_page_and_in_json(nights, tmp_path):
     assert b"badbadba" in markdown
 
 
-def test_the_last_run_is_guarded_and_a_broken_one_is_told(nights, tmp_path):
+def test_the_last_run_is_guarded_and_the_last_good_one_is_a_base(nights, tmp_path):
     folder = tmp_path / "nightly"
     for night in ("18", "19", "20", "21"):
         shutil.copytree(nights / night, folder / night)
-    worse = ("--fail-if", "post.filtered.ERR > +0.1pp surely")
+    worse = ("--fail-if", "post.filtered.ERR > +0.1pp")
     run = here("history", folder, "--last", "2", *worse, "-q")
     assert run.returncode == 4, run.stderr
     assert "limit exceeded" in run.stderr
+    run = here("compare", folder, nights / "29")
+    assert run.returncode == 0, run.stderr
+    assert "against 20" in run.stdout
     (folder / "19" / "frames.csv").write_text("cut")
     run = here("history", folder, "--json")
     assert run.returncode == 3, run.stderr
     assert "19" in run.stderr
-    assert [night["frames"] for night in json.loads(run.stdout)["runs"]] == [90, 0, 90, 90]
-
-
-def test_the_last_good_run_of_a_folder_is_a_base(nights):
-    run = here("compare", nights, nights / "29")
-    assert run.returncode == 0, run.stderr
-    assert "20" in run.stdout
+    frames = [night["frames"] for night in json.loads(run.stdout)["runs"]]
+    assert frames == [frames[0], 0, frames[0], frames[0]]
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 """Histories of many results: read in their order, judged, and written."""
 
 import json
+import os
 import shutil
 
 import pytest
 
 from roadeval import compare
-from roadeval.jobs.results.history import history
+from roadeval.errors import RoadevalError
+from roadeval.jobs.results.history import find_results, history, write
 from roadeval.results.history import verdict
 from tests.results.fleet.making import SCORED, fleet_of
 
@@ -46,6 +48,58 @@ def test_the_run_that_is_worse_is_named_with_what_changed(made):
     assert {drive for drive, _, _ in event.frames} == set(event.first.drives["drive"][:2])
     assert [run.title for run in made.runs][::7] == ["1972-09-27", "1972-10-04"]
     assert "in the run of 1972-10-02 (55555555), on 2 of 6 drives" in verdict(made)
+
+
+def test_results_that_share_a_label_are_one_run(nights):
+    made = history(nights, by="build")
+    assert [(run.title, len(run.paths), run.drives) for run in made.runs] == [
+        (f"{build}", 2, 6) for build in range(4)
+    ]
+    # Of a drive that a run has twice the later result counts.
+    assert [event.run for event in made.events] == [2]
+
+
+def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path):
+    folder = shutil.copytree(nights, tmp_path / "nights")
+    old = folder / "2" / "fleet.json"
+    old.write_text(old.read_text().replace('"version": 3', '"version": 2', 1))
+    (folder / "3" / "scores.parquet").write_bytes(b"PAR1")
+    made = history(folder)
+    assert [run.drives for run in made.runs] == [6, 6, 0, 6, 6, 6, 6]
+    assert [event.run for event in made.events] == [4]
+    assert len(made.lost) == 2
+    assert "whose format is no longer read" in made.lost[0]
+    assert "scores.parquet: damaged" in made.lost[1]
+
+
+def test_recordings_and_folders_of_one_run_are_not_taken_twice(nights, tmp_path):
+    folder = shutil.copytree(nights / "0", tmp_path / "all" / "0").parent
+    (folder / "0.rrd").write_bytes(b"a recording of the same run")
+    assert find_results(folder) == [folder / "0"]
+    shutil.rmtree(folder / "0")
+    assert find_results(folder) == [folder / "0.rrd"]
+    (folder / "0.rrd").unlink()
+    with pytest.raises(RoadevalError, match="holds no results"):
+        find_results(folder)
+
+
+def test_a_drive_that_has_gone_and_classes_are_told(nights, tmp_path):
+    for night in range(7):
+        shutil.copytree(nights / f"{night}", tmp_path / f"{night}")
+    fleet_of(tmp_path / "7", 5, change=0.09, status=lambda _: SCORED)
+    os.utime(tmp_path / "7" / "fleet.json", (2 * 10**9,) * 2)
+    event = history(tmp_path).events[-1]
+    assert event.run == 7
+    assert "drives that are gone: drive_0005-00000005" in event.reasons
+
+
+@pytest.mark.parametrize("end", ["html", "pdf", "md", "json"])
+def test_every_kind_of_file_tells_the_same(end, made, tmp_path):
+    path = write(made, tmp_path / f"history.{end}")
+    if end != "pdf":
+        text = path.read_text()
+        assert "rose by 1.24 points" in text
+        assert str(made.runs[3].paths[0]) in text
 
 
 def test_the_base_of_a_comparison_is_the_last_good_run_of_a_folder(made, nights):

@@ -10,7 +10,6 @@ import typer
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.arguments import option
-from roadeval.cli.commands.inspect import Results
 
 
 def _span(text: str) -> range:
@@ -20,7 +19,7 @@ def _span(text: str) -> range:
 
 
 def clip(
-    result: Results,
+    result: arguments.Result,
     *,
     output: Annotated[
         Path, option("-o --output", "Folder, or the .mp4 or .gif of one clip.", "FOLDER|FILE")

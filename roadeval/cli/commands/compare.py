@@ -9,10 +9,10 @@ from typing import Annotated
 from roadeval.cli import arguments, console, messages
 
 Results = Annotated[
-    list[Path],
+    list[str],
     arguments.argument(
         "BASE NEW...",
-        "Recordings, results folders or fleets; for a single one, its variants are compared.",
+        "Recordings, results folders, fleets or URLs; of a single one variants are compared.",
     ),
 ]
 Variants = Annotated[

@@ -11,7 +11,7 @@ from roadeval.cli.arguments import argument, option
 
 def history(
     results: Annotated[
-        list[Path],
+        list[str],
         argument("RESULT...|FOLDER", "Results of many runs, or folders with results below."),
     ],
     *,

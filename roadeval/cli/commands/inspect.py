@@ -14,9 +14,6 @@ from roadeval.cli.exit_codes import ExitCode
 if TYPE_CHECKING:
     from roadeval.jobs.results.result import Result
 
-Results = Annotated[
-    Path, arguments.argument("RESULT", "A recording (.rrd), a results folder, or a fleet's folder.")
-]
 Listed = Annotated[bool, arguments.option("--list", "List of the worst frames, with reasons.")]
 Frame = Annotated[int | None, arguments.option("--frame", "Frame to open.", "N", min=0)]
 Rank = Annotated[
@@ -42,7 +39,7 @@ Screenshot = Annotated[
 
 
 def inspect(
-    recording: Results,
+    recording: arguments.Result,
     *,
     listed: Listed = False,
     frame: Frame = None,

@@ -145,18 +145,18 @@ def _ends(values: Floats, drives: pd.DataFrame, steps: Sequence[Step], levels: F
     It is that of the drives' changes from their own means since the last step.
     """
     ends, group = np.full((2, len(values)), np.nan), drives["group"].factorize()[0]
-    breaks = sorted({0, *(step.run for step in steps), len(values)})
-    for begin, end in pairwise(breaks):
-        part = values[begin:end]
-        there = ~np.isnan(part)
-        away = part - np.where(there, part, 0).sum(0) / np.maximum(there.sum(0), 1)
-        for run, (changes, is_there) in enumerate(zip(away, there, strict=True), begin):
-            sums = np.bincount(group[is_there], changes[is_there])
-            counts = np.bincount(group[is_there])
-            means = sums[counts > 0] / counts[counts > 0]
-            if len(means) >= LEAST_GROUPS:
-                interval = mean_distribution(means, independent=True).interval(0.95)
-                ends[:, run] = levels[run] - means.mean() + interval
+    member = group[:, None] == np.unique(group)
+    for begin, end in pairwise(sorted({0, *(step.run for step in steps), len(values)})):
+        there = ~np.isnan(values[begin:end])
+        rates = np.where(there, values[begin:end], 0)
+        away = np.where(there, rates - rates.sum(0) / np.maximum(there.sum(0), 1), 0)
+        with np.errstate(invalid="ignore"):
+            means = (away @ member) / (there @ member)
+        for run, of_groups in enumerate(means, begin):
+            defined = of_groups[~np.isnan(of_groups)]
+            if len(defined) >= LEAST_GROUPS:
+                interval = mean_distribution(defined, independent=True).interval(0.95)
+                ends[:, run] = levels[run] - defined.mean() + interval
     return ends
 
 

@@ -51,11 +51,9 @@ def shrink(image: Rgb) -> Plane:
     import cv2
 
     height, width, _ = image.shape
-    small = cv2.resize(
-        image, (ACROSS, max(height * ACROSS // width, 1)), interpolation=cv2.INTER_AREA
-    )
-    grey: Plane = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
-    return grey
+    size = ACROSS, max(height * ACROSS // width, 1)
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY))
 
 
 def blur(image: Rgb) -> float:

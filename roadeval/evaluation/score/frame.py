@@ -223,5 +223,4 @@ def _resize(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
     import cv2
 
     how = cv2.INTER_LINEAR if mixed else cv2.INTER_NEAREST
-    resized: Cells = cv2.resize(image, (shape[1], shape[0]), interpolation=how)
-    return resized
+    return cv2.resize(image, shape[1::-1], interpolation=how)

@@ -19,6 +19,7 @@ import numpy as np
 
 from roadeval.data import CODES, Doubt, FrameResult, Packed, Probability, VariantResult, ones
 from roadeval.data.arrays import Floats, Sums, Values
+from roadeval.data.result import as_tree
 from roadeval.evaluation.stats.sampling import draw_order
 from roadeval.evaluation.tables import spread
 
@@ -87,12 +88,11 @@ class Unlabelled:
 
     def add(self, result: FrameResult) -> tuple[Doubt, ...]:
         """Add a frame, in the drive's order; return its doubts with their flicker."""
-        before, now = self._before, {}
-        if result.doubts:
-            now = {v.variant: mask for v in result.variants for _, mask in v.masks()}
-        self._before = now
+        before, variants = self._before, result.variants if result.doubts else ()
+        self._before = now = {v.variant: mask for v in variants for _, mask in v.masks()}
         doubts = []
-        for name, still in ((doubt.variant, doubt) for doubt in result.doubts):
+        for still in result.doubts:
+            name = still.variant
             changed = _share(now[name], before[name]) if name in before else math.nan
             doubt = replace(still, flicker=changed)
             doubts.append(doubt)
@@ -120,13 +120,10 @@ class Unlabelled:
         table[[*SIGNS]] = np.array(self._signs).reshape(-1, len(SIGNS))
         return table
 
-    def differing(self) -> dict[tuple[str, str], float]:
+    def differing(self) -> dict[str, dict[str, float]]:
         """Return for each pair of variants the mean share of pixels on which they differ."""
-        return {
-            pair: self._differ[pair][0] / self._differ[pair][1]
-            for pair in combinations(self._stages, 2)
-            if pair in self._differ
-        }
+        pairs = [pair for pair in combinations(self._stages, 2) if pair in self._differ]
+        return as_tree((pair, self._differ[pair][0] / self._differ[pair][1]) for pair in pairs)
 
 
 def sign_of(rows: pd.DataFrame) -> str | None:

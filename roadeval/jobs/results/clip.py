@@ -19,7 +19,7 @@ from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.frames import FramePicker, facts_of
 from roadeval.jobs.results.inspect import rank_frames
 from roadeval.jobs.results.pick import find_recordings
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.logs.log import open_log
 from roadeval.logs.writing.writer import VIDEO_SUFFIXES
 from roadeval.report.film import clip_picture, encode
@@ -50,7 +50,7 @@ def clip(
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
     if form is None and place.suffix.lower() in VIDEO_SUFFIXES:
         raise RoadevalError("a clip ends in .mp4 or .gif", where=place)
-    results = [Result(path, focus=focus) for path in find_recordings(Path(result))]
+    results = [Result(path, focus=focus) for path in find_recordings(local_path(result))]
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
     if not scenes or (form and len(scenes) > 1):

@@ -17,7 +17,7 @@ from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
 from roadeval.jobs.results.history import last_good
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.comment import badge
@@ -76,7 +76,7 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [Path(path) for path in list_paths(results)]
+    paths = [local_path(path) for path in list_paths(results)]
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
@@ -200,11 +200,7 @@ def _frames(side: Side) -> pd.DataFrame:
 
 
 def over_drive(compared: Compared) -> list[Chart]:
-    """Return ERR over the one drive that is compared, and the baseline's; none of several.
-
-    Of a variant it is that of the frames on which all results have its mask. Where the variants of
-    one result are compared, each is a result.
-    """
+    """Return ERR over the one drive, and the baseline's, on the frames that all results have."""
     masks_of = {side.label: finals(_frames(side)) for side in compared.sides}
     alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
     masks, parts = {}, []

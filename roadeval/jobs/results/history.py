@@ -33,7 +33,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
 from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.results.result import Result
+from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
 from roadeval.report.writing import write_document
 from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
@@ -41,6 +41,7 @@ from roadeval.results.history import Event, History, RunFacts, as_dict, group_ch
 from roadeval.results.schema import TAG
 from roadeval.results.tables import read_parquet, read_table
 from roadeval.runtime.files import Paths, list_paths
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +64,7 @@ COLUMNS: Final[Mapping[str, Sequence[str]]] = {
         *MASK_RATES,
     ),
     "drives": (*KEY, "name", "log_digest", "group", "status"),
-    "classes": (*KEY, "variant", "name", "truth", "pixels", "road", "frames"),
+    "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
 }
 """Columns that are read of each table of a fleet."""
 
@@ -98,7 +99,7 @@ def history(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     lost: list[str] = []
-    paths = [path for given in list_paths(results) for path in find_results(Path(given))]
+    paths = [path for given in list_paths(results) for path in find_results(local_path(given))]
     opened: dict[Path, Result] = {}
     for path in paths:
         try:
@@ -139,7 +140,7 @@ def find_results(path: Path) -> list[Path]:
 
     Recordings count only if there is no folder of results. A `RoadevalError` if there is none.
     """
-    if path.is_file() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
+    if not path.is_dir() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
         return [path]
     folders, recordings = [], []
     for folder, below, files in os.walk(path):
@@ -179,8 +180,9 @@ def _runs_in_order(
         datetime.fromtimestamp((members[0][0].made_ns or 0) / 1e9, UTC)
         for members in groups.values()
     ]
-    is_daily = len({time.date() for time in times}) == len(times)
-    form = "%Y-%m-%d" if is_daily else "%Y-%m-%d %H:%M"
+    forms = ("%Y-%m-%d", "%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S")
+    distinct = (form for form in forms if len({f"{time:{form}}" for time in times}) == len(times))
+    form = next(distinct, forms[-1])
     return [
         RunFacts(
             tuple(p for _, p in members), members[0][0], title=name if by else f"{time:{form}}"
@@ -192,10 +194,10 @@ def _runs_in_order(
 def _origin(result: Result, path: Path) -> Origin:
     """Return how a result was made; its time is that of its file if it does not say."""
     origin = result.facts.origin or Origin()
-    if origin.made_ns is not None:
-        return origin
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
-    return replace(origin, made_ns=file.stat().st_mtime_ns)
+    made_ns = origin.made_ns or file.stat().st_mtime_ns
+    labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+    return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
 
 
 def _read_rows(
@@ -247,7 +249,9 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     classes = classes[is_class & (classes["pixels"] > 0)]
     right = classes["road"] / classes["pixels"]
     wrong = right.where(classes["truth"] == "other", 1 - right)
-    of_classes = classes.assign(kind="class", part=classes["name"], ERR=wrong, N=classes["pixels"])
+    texts = classes["name"].astype(str)
+    part = texts.where(texts != "", "class " + classes["class"].astype(str))
+    of_classes = classes.assign(kind="class", part=part, ERR=wrong, N=classes["pixels"])
     kind = np.where(scores["region"] == ALL, ALL, "region")
     of_masks = scores.assign(kind=kind, part=scores["region"], road=scores["TP"] + scores["FN"])
     about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]

@@ -21,7 +21,7 @@ from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings
 from roadeval.report.page.render import page, write_page
 from roadeval.report.pdf.typeset import typeset, write_file
-from roadeval.results.facts import Facts
+from roadeval.results.facts import FETCHED, Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import leads_outside, writing
 
@@ -60,8 +60,9 @@ def write_report(
     (source,) = opened.paths
     name = opened.drive.camera if opened.drive else ""
     camera = f"-{as_plain(name)}" if name else ""
-    usual = Path("reports", f"{source.stem}{camera}.pdf") if opened.recording else None
-    path = Path(output or usual or source / f"report{camera}.pdf")
+    usual = opened.recording or source in FETCHED
+    beside = Path("reports", f"{source.stem}{camera}") if usual else source / f"report{camera}"
+    path = Path(output or beside.with_name(f"{beside.name}.pdf"))
     if not (output or usual) and leads_outside(path, source):  # it may come from someone else
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
     with holding(path, inputs=[source]):

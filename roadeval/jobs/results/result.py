@@ -22,6 +22,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, values_of
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
+    FETCHED,
     SUMMARY,
     DriveFacts,
     Facts,
@@ -65,6 +66,15 @@ def _if_there(read: Callable[..., Cells], *address: Any) -> Cells | None:
         raise
     except RecordingError:
         return None
+
+
+def local_path(result: str | Path) -> Path:
+    """Return the path of a result; one behind a URL is fetched."""
+    if "://" not in str(result):
+        return Path(result)
+    from roadeval.fleet.remote import fetch_result
+
+    return fetch_result(str(result))
 
 
 class DriveResult:
@@ -119,7 +129,8 @@ class DriveResult:
     def inspect(self, frame: int | str) -> str:
         """Return the command that opens a frame in the viewer."""
         camera = ["--camera", self.camera] if self.camera else []
-        words = ["roadeval", "inspect", str(self.viewable or self.path), *camera]
+        path = self.viewable or self.path
+        words = ["roadeval", "inspect", FETCHED.get(path, str(path)), *camera]
         return f"{shlex.join(words)} --frame {frame}"
 
     @cached_property
@@ -280,6 +291,8 @@ def _open(path: Path, focus: str | None) -> list[Opened]:
         drive = DriveResult(path, focus=focus)
     except SeveralCamerasError as error:
         return [DriveResult(path, name, focus) for name in error.cameras]
+    except RoadevalError as error:
+        raise error.of(error, FETCHED.get(path, "")) from error
     cameras = drive.facts.cameras if drive.recording is None else ()
     return [DriveResult(path, name, focus) for name in cameras] or [drive]
 
@@ -293,7 +306,7 @@ class Result:
     Parameters
     ----------
     paths
-        Recordings, results folders and fleets' folders, perhaps from elsewhere.
+        Recordings, results folders, fleets' folders, or URLs of recordings or of zips of these.
     focus
         The variant that they are about: verdict, worst frames, pictures. By default what they were
         made about.
@@ -310,7 +323,7 @@ class Result:
     """
 
     def __init__(self, *paths: str | Path, focus: str | None = None) -> None:
-        self.paths = tuple(map(Path, paths))
+        self.paths = tuple(map(local_path, paths))
         self._chosen: Final = focus
         self._opened: list[Opened] = [r for path in self.paths for r in _open(path, focus)]
         if focus:

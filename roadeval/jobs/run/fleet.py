@@ -98,8 +98,7 @@ def replay_fleet(
     on_progress
         Called in the caller's thread as drives are done.
     """
-    commit = current_commit()
-    config = (config or RunConfig()).resolved()
+    commit, config = current_commit(), (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in list_paths(drives)])
     if config.cameras:
         entries = name_cameras(
@@ -121,9 +120,9 @@ def replay_fleet(
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
     asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    origin = Origin(time.time_ns(), *commit, dict(config.output.labels))
-    given = members, config.evaluation, config.as_dict(), text
-    facts = writer.finish(*given, asked=asked, origin=origin)
+    how = config.evaluation, config.as_dict(), text
+    origin = Origin(time.time_ns(), *commit, {**config.output.labels})
+    facts = writer.finish(members, *how, asked=asked, origin=origin)
     counts = Counter(drive.status for drive in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not drive.repeated for drive in run.done.values())
@@ -164,11 +163,6 @@ class FleetRun:
         progress = Progress(len(done), len(self.entries), stage, "", "drives", ", ".join(detail))
         self.on_progress(progress)
 
-    def _task(
-        self, entry: DriveEntry, config: RunConfig, model: str, fold: int | None
-    ) -> DriveTask:
-        return DriveTask(self.folder, entry, config, software(config), model, fold)
-
     def _by_model(self) -> Iterator[DriveTask]:
         """Yield the tasks of drives that one model scores, or that train their own."""
         digest, model = "", self.config.training.model
@@ -176,7 +170,8 @@ class FleetRun:
             with reading(model, FleetError, "cannot read the model"):
                 digest = sha256_of(Path(model))
         for entry in self.entries:
-            yield self._task(entry, entry.config(self.config), digest, None)
+            config = entry.config(self.config)
+            yield DriveTask(self.folder, entry, config, software(config), digest)
 
     def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
         """Return the tasks of drives that are not done. A URL is looked at by its worker."""
@@ -225,7 +220,8 @@ class FleetRun:
             config = configs[entry.id].override(
                 {"training": {"model": str(training[fold.fold].path)}}
             )
-            task = self._task(entry, config, fold.sha256, fold.fold)
+            how = software(config), fold.sha256, fold.fold
+            task = DriveTask(self.folder, entry, config, *how)
             if fold.problem:
                 self._fail(task, fold.problem)
             else:

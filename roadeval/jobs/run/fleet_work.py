@@ -222,7 +222,7 @@ def _replay(task: DriveTask) -> None:
     pictures = WorstPictures(task.focus)
     outcome = replay(task.entry.source, config, on_frame=pictures.offer)
     _remove(task, PICTURES, *CACHED, *([RECORDINGS] if task.record == "none" else []))
-    for frame, picture in pictures.kept.items():
+    for _, frame, _, picture in pictures.worst:
         put(folder / PICTURES / drive / f"{frame}.jpg", picture)
     if outcome.facts.frames.evaluated:
         cache(folder, drive)
@@ -238,9 +238,8 @@ def _remove(task: DriveTask, *folders: str) -> None:
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
     }
-    partial = find_partial(recording, hidden=False) if recording.parent.exists() else []
-    chosen = [paths[name] for name in folders]
-    for path in (*chosen, *(partial if RECORDINGS in folders else ())):
+    partial = find_partial(recording, hidden=False) if RECORDINGS in folders else []
+    for path in (*(paths[name] for name in folders), *partial):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         else:
@@ -397,13 +396,8 @@ class WorstPictures:
 
     def __init__(self, focus: str | None) -> None:
         self._focus = focus
-        self._worst: list[tuple[float, int, int, bytes]] = []
+        self.worst: list[tuple[float, int, int, bytes]] = []
         """ERR, number, stamp and picture of each, the worst first."""
-
-    @property
-    def kept(self) -> dict[int, bytes]:
-        """The pictures by the frames' numbers."""
-        return {number: picture for _, number, _, picture in self._worst}
 
     def offer(self, result: FrameResult) -> None:
         """Keep a frame as long as it is one of the worst; one without a rate is ignored."""
@@ -412,8 +406,8 @@ class WorstPictures:
         errors = [t.rates[TESTED] for t in result.tallies if t.variant == variant]
         if variant is None or not errors or math.isnan(error := errors[-1]):
             return
-        near = [rival for rival in self._worst if abs(rival[2] - frame.stamp_ns) < APART_NS]
-        rest = [rival for rival in self._worst if rival not in near]
+        near = [rival for rival in self.worst if abs(rival[2] - frame.stamp_ns) < APART_NS]
+        rest = [rival for rival in self.worst if rival not in near]
         rivals = [*near, *(rest[-1:] if len(rest) == OF_A_DRIVE else [])]
         if any(rival[0] >= error for rival in rivals):
             return
@@ -422,4 +416,4 @@ class WorstPictures:
         small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
         ranked = [*rest, (error, frame.number, frame.stamp_ns, picture)]
-        self._worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:OF_A_DRIVE]
+        self.worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:OF_A_DRIVE]

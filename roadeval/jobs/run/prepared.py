@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
@@ -51,6 +51,9 @@ from roadeval.training.model import Model, ModelError
 from roadeval.training.settings import TrainingSettings
 from roadeval.version import VERSION
 
+if TYPE_CHECKING:
+    from roadeval.recording.recorder import Recorder
+
 KEPT: Final = 5
 """Tracebacks that are kept, those of the first errors that say different things; and the frames
 that are named of those with one error."""
@@ -80,9 +83,6 @@ class Failures:
     by_error: dict[tuple[str, str], list[Failure]] = field(default_factory=dict)
     first: list[Failure] | None = field(default_factory=list)
     """The failures of `TRIED` roles; None once a frame of these did not fail."""
-
-    def __len__(self) -> int:
-        return sum(map(len, self.by_error.values()))
 
     def add(self, failure: Failure) -> None:
         """Note a frame; its traceback is kept where it is among the first that differ."""
@@ -248,8 +248,9 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
             frames,
         )
         on_progress(Progress(0, None, "opening", note))
-    learn = partial(_learn, again, variants, config.training, on_progress)
-    model, schedule = learn(labelled=labelled, picks=picks)
+    model, schedule = _learn(
+        again, variants, config.training, on_progress, labelled=labelled, picks=picks
+    )
     try:
         chains = bind(variants, model)
     except MisfitError as error:
@@ -376,13 +377,6 @@ def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-class Encoder(Protocol):
-    """The part of a recorder that encodes a frame; called from any thread."""
-
-    def encode(self, result: FrameResult, position: int) -> Any:
-        """Encode the frame at ``position`` among those read, from 0."""
-
-
 @dataclass(frozen=True, eq=False)
 class ProcessedFrame:
     """A scored frame without its layers, its lines of the tables, and its encoded form.
@@ -399,7 +393,7 @@ class ProcessedFrame:
 
 
 def process(
-    runs: Sequence[Run], encoder: Encoder | None, on_progress: OnProgress
+    runs: Sequence[Run], recorder: Recorder | None, on_progress: OnProgress
 ) -> Iterator[tuple[Run, ProcessedFrame]]:
     """Yield every decodable frame of the cameras by log time, and add it to its run's score.
 
@@ -415,7 +409,7 @@ def process(
             yield runs[place], read[place], logged
 
     workers = runs[0].config.run.jobs or os.cpu_count() or 1
-    work = partial(_process, encoder)
+    work = partial(_process, recorder)
     for position, (run, done) in enumerate(map_ordered(work, numbered(), workers), 1):
         on_progress(Progress(position, total, "replaying"))
         if position % TRIM_EVERY == 0:
@@ -448,7 +442,7 @@ def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
 
 
 def _process(
-    encoder: Encoder | None, item: tuple[Run, int, LoggedFrame]
+    recorder: Recorder | None, item: tuple[Run, int, LoggedFrame]
 ) -> tuple[Run, ProcessedFrame | Failure | None]:
     run, position, logged = item
     try:
@@ -458,12 +452,12 @@ def _process(
     role = run.schedule.role(frame)
     if role is Role.UNLABELLED and frame.truth is not None:
         frame = replace(frame, truth=None, classes=None)  # it is a proposal as it was made
-    truths_known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
+    is_scored = role is Role.EVALUATED
+    truths = {"truth": frame.truth, "shadow_truth": frame.shadow_truth} if is_scored else {}
     shared: dict[Any, Any] = {}
     view = View.of_frame(frame)
     variants = []
     for name, chain in run.chains.items():
-        truths = {"truth": truths_known[0], "shadow_truth": truths_known[1]}
         try:
             variant_result = run_variant(name, chain, view, **truths, known=shared)
         except AbsentError:
@@ -478,10 +472,10 @@ def _process(
         if name not in run.chains
     ]
     result = run.board.score(frame, role, tuple(variants))
-    disturbed, failures = _disturb(run, frame) if role is Role.EVALUATED else ({}, [])
+    disturbed, failures = _disturb(run, frame) if is_scored else ({}, [])
     result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = csv_lines(run.key, frame_rows(result))
-    encoded = encoder.encode(result, position - 1) if encoder else None
+    encoded = recorder.encode(result, position - 1) if recorder else None
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
     return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)
 

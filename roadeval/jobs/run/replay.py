@@ -149,8 +149,8 @@ def _replay_log(
                 for camera, end in zip(cameras, ended, strict=True):
                     windows, shown = end.sums.windows, drawn[camera]
                     write_figures(results.folder, log.name, windows, shown, names[camera])
-        origin = Origin(time.time_ns(), *commit, dict(config.output.labels))
-        facts = results.finish(replace(facts, origin=origin), run_toml(config, log.name, VERSION))
+        facts = replace(facts, origin=Origin(time.time_ns(), *commit, {**config.output.labels}))
+        facts = results.finish(facts, run_toml(config, log.name, VERSION))
     of_focus = finals(only(ended[0].sums.frames, variant=facts.focus or ""))
     files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
     return Outcome(

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.config.variants import AS_IT_IS
-from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role, as_tree
+from roadeval.data import BASELINE, CERTAIN, FINAL_STAGE, TUNED, Role
 from roadeval.data.words import listing
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.score.degradation import degradations
 from roadeval.evaluation.score.fit import LAST_LAG, TRUTH, Finding, FitCheck, Misfit
 from roadeval.evaluation.score.scoreboard import DriveSums, drive_effects
-from roadeval.evaluation.score.unlabelled import Unlabelled
 from roadeval.evaluation.stats.sampling import Estimate, estimate
 from roadeval.jobs.run.prepared import Run, computing
 from roadeval.logs.errors import FrameError
@@ -37,7 +36,6 @@ from roadeval.results.facts import (
     LogFacts,
     Totals,
     TrainingFacts,
-    UnlabelledFacts,
 )
 from roadeval.results.sentences import misfit
 from roadeval.results.tables import TableFacts
@@ -53,6 +51,8 @@ FEW: Final = 12
 """Frames of a log that are looked at, with their neighbours, where nothing is replayed."""
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 """Signs that a frame has by itself, without the one before."""
+OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "why", "seconds")
+"""Facts that the cameras of a rig do not have together."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
@@ -63,26 +63,25 @@ def make_facts(
 
     ``stated`` are rows and checksums of the tables.
     """
-    parts, effects = sums.parts, sums.effects
-    settings = run.config.training
+    settings, selection, doubts = run.config.training, run.selection, run.board.unlabelled
     is_given = settings.model is not None and not settings.adapt
     facts = Facts(
-        **parts,
-        effects=[*effects],
+        **sums.parts,
+        effects=[*sums.effects],
         verdict="",
-        misfits=[*_misfit_sentences(run)],
-        unlabelled=_unlabelled_facts(run.board.unlabelled),
+        misfits=[misfit_sentence(f, selection, run.config) for f in run.fit.findings()],
+        unlabelled=describe_doubts(doubts.rows(), doubts.differing()),
         estimate=_estimate_rates(run, sums.frames),
         thresholds=dict(_best_thresholds(run)),
         drive=DriveFacts(
             run.log.name,
             run.key.camera,
-            *(run.selection.size or (0, 0)),
-            rate_hz=run.selection.image.rate_hz,
+            *(selection.size or (0, 0)),
+            rate_hz=selection.image.rate_hz,
             **sums.times,
-            topics=[*run.selection.reasons, *run.config.ignored_settings()],
+            topics=[*selection.reasons, *run.config.ignored_settings()],
             calibration=run.calibration,
-            ground=run.selection.ground_as_read,
+            ground=selection.ground_as_read,
         ),
         frames=_account_for_frames(run),
         examples=examples,
@@ -94,8 +93,8 @@ def make_facts(
             None if is_given else "picked" if run.schedule.picks else settings.placement,
             settings.adapt,
         ),
-        warnings=list(warnings(run, parts["totals"])),
-        losses=list(losses(run)),
+        warnings=list(warnings(run, sums.parts["totals"])),
+        losses=[*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences()],
         run=run.config.as_dict(),
         settings={variant.name: variant.pipeline.as_dict() for variant in run.variants},
         methods=run.methods,
@@ -105,11 +104,6 @@ def make_facts(
         tables=stated,
     )
     return replace(facts, verdict=verdict_on(facts))
-
-
-def _unlabelled_facts(frames: Unlabelled) -> UnlabelledFacts | None:
-    """Return which frames without truth to look at, by the focus."""
-    return describe_doubts(frames.rows(), as_tree(frames.differing().items()))
 
 
 def _estimate_rates(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
@@ -144,12 +138,6 @@ def _why_not_random(run: Run, picks: Picks) -> str:
     if seen.in_range < seen.in_log or (seen.read < seen.in_range and not labelled):
         return "only a part of the drive was read"
     return ""
-
-
-def _misfit_sentences(run: Run) -> Iterator[str]:
-    """Yield what of truth and masks does not fit the images, and what to do about it."""
-    for finding in run.fit.findings():
-        yield misfit_sentence(finding, run.selection, run.config)
 
 
 def misfits_of_truth(log: Log) -> Iterator[str]:
@@ -223,12 +211,10 @@ def join_cameras(
     """Return the facts of a rig: of its cameras together, each of which counts the same."""
     first, *_ = cameras.values()
     by_camera = tables.totals(frames, ["camera", *tables.MASK])
-    totals = tables.as_trees(tables.over_cameras(by_camera))
-    effects = drive_effects(frames, first.evaluation)
+    empty: Mapping[str, Any] = {name: {} for name in OF_ONE_CAMERA}
     misfits: list[str] = [
         Sentence("{}: {}", name, text) for name, facts in cameras.items() for text in facts.misfits
     ]
-    claims: dict[str, dict[str, int]] = _add_counts(facts.claims for facts in cameras.values())
     accounts = [asdict(facts.frames) for facts in cameras.values()]
     skipped = Counter[str]()
     for account in accounts:
@@ -236,28 +222,22 @@ def join_cameras(
     counted = {name: sum(account[name] or 0 for account in accounts) for name in accounts[0]}
     facts = replace(
         first,
-        effects=effects,
+        effects=drive_effects(frames, first.evaluation),
         misfits=misfits,
         drive=DriveFacts(first.drive.name, rate_hz=first.drive.rate_hz),
         frames=FrameAccount(**counted, skipped=dict(skipped)),
-        totals=totals,
+        totals=tables.as_trees(tables.over_cameras(by_camera)),
         windows=sum(facts.windows for facts in cameras.values()),
-        claims=claims,
+        claims=_add_counts(facts.claims for facts in cameras.values()),
         health=_add_counts(facts.health for facts in cameras.values()),
         warnings=[*_name_cameras({name: facts.warnings for name, facts in cameras.items()})],
         losses=[*_name_cameras({name: facts.losses for name, facts in cameras.items()})],
-        beyond={},
-        curves={},
-        thresholds={},
-        slices={},
-        oracles={},
         disturbances=degradations(disturbed, frames, first.evaluation),
-        why={},
-        seconds={},
-        examples=[],
         training=TrainingFacts(first.training.source, model=first.training.model),
         tables=stated,
         cameras={**cameras},
+        examples=[],
+        **empty,
     )
     return replace(facts, verdict=verdict_on(facts))
 
@@ -329,7 +309,8 @@ def _size_warnings(run: Run) -> Iterator[str]:
 
 def _ranking_warnings(run: Run) -> Iterator[str]:
     """Yield by what ``worst:K`` ranked the frames of a log without truth."""
-    rule, unlabelled = run.config.output.record, _unlabelled_facts(run.board.unlabelled)
+    rule, doubts = run.config.output.record, run.board.unlabelled
+    unlabelled = describe_doubts(doubts.rows(), doubts.differing())
     if rule.startswith("worst:") and unlabelled:
         pictures = (
             f"kept the frames that are most in doubt, by {unlabelled.sign} of {unlabelled.variant}"
@@ -419,11 +400,6 @@ def _label_warnings(run: Run) -> Iterator[str]:
         )
 
 
-def losses(run: Run) -> tuple[str, ...]:
-    """List the parts of the log that were lost, and the frames on which a stage failed."""
-    return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
-
-
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield a warning where masks of other systems are missing, or belong to no frame."""
     seen = run.frames.accounting
@@ -475,9 +451,8 @@ def _training_warnings(run: Run) -> Iterator[str]:
     """Warn where frames that trained a model file lie in this drive."""
     roles, trained = Counter(run.board.roles()), len(run.model.digests)
     of_this_drive, settings = roles[Role.TRAINING], run.config.training
-    if settings.model is None or settings.adapt or not roles[Role.EVALUATED]:
-        return
-    if of_this_drive:
+    is_given = settings.model is not None and not settings.adapt
+    if is_given and of_this_drive and roles[Role.EVALUATED]:
         yield (
             f"{of_this_drive} of the model's {trained} training frames lie in this drive; their "
             f"neighbours are evaluated and {FLATTERED}"

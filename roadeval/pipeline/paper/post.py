@@ -5,7 +5,6 @@ Masks are packed here, 64 pixels a word: see `roadeval.data.arrays`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Final, Literal
 
@@ -15,7 +14,7 @@ from pydantic import Field, field_validator
 from roadeval.data import Layer, Packed, colours, mask_spec
 from roadeval.data.arrays import Reach
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.stage import Output, Stage, View, stage_settings
+from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
 
 LINE: Final = 3
 """Side of the square that erodes the result for its boundary (Eq. 22), a line one pixel wide."""
@@ -129,18 +128,14 @@ def post_process(mask: Packed, settings: PostSettings) -> Packed:
     return fill_holes(mask) if settings.fill else mask
 
 
-def bind(settings: PostSettings, _parameters: None) -> Callable[[View], Output]:
-    """Return phase 4 as a pure function of the mask before it."""
-    edge = structuring_element(LINE)
-
-    def run(view: View) -> Output:
-        if view.mask is None:
-            raise ValueError("post-processing needs a stage with a road mask before it")
-        road = post_process(view.mask, settings)
-        line = boundary(road, edge)
-        return Output((Layer(POST, road), Layer(BOUNDARY, line)), mask=road)
-
-    return run
+@per_view
+def bind(settings: PostSettings, _learnt: None, view: View) -> Output:
+    """Process the mask before it."""
+    if view.mask is None:
+        raise ValueError("post-processing needs a stage with a road mask before it")
+    road = post_process(view.mask, settings)
+    line = boundary(road, structuring_element(LINE))
+    return Output((Layer(POST, road), Layer(BOUNDARY, line)), mask=road)
 
 
 STAGE: Final = Stage(

@@ -94,7 +94,7 @@ def test_some_columns_are_read_alone_with_tags_and_damage_elsewhere_is_not_seen(
     for name, chosen in columns.items():
         rows = whole.table(name)
         tags = [column for column in rows if column.startswith("tag_")]
-        some = whole.table(name, columns=chosen)
+        some = read_parquet([folder / f"{name}.parquet"], name, chosen)
         assert {*some} == {*chosen, *tags}
         assert some.equals(rows[[*some]])
         with pytest.raises(ResultsError, match=r"damaged .no column FPR"):
@@ -104,7 +104,7 @@ def test_some_columns_are_read_alone_with_tags_and_damage_elsewhere_is_not_seen(
     assert place > 0
     with pytest.raises(ResultsError, match="damaged"):
         whole.table("drives")
-    assert len(whole.table("drives", columns=columns["drives"])) == 5
+    assert len(read_parquet([path], "drives", columns["drives"])) == 5
 
 
 def test_of_an_older_fleet_nothing_is_known_of_the_truth(folder):
@@ -115,7 +115,15 @@ def test_of_an_older_fleet_nothing_is_known_of_the_truth(folder):
     older = FleetFolder(folder)
     assert older.table("scores").equals(rows.assign(truth=0))
     assert {*older.table("frames")["truth"]} == {0}
-    assert {*older.table("scores", columns=["drive", "truth"])["truth"]} == {0}
+    some = read_parquet([folder / "scores.parquet"], "scores", ["drive", "truth"])
+    assert {*some["truth"]} == {0}
+
+
+def test_a_column_that_one_of_several_files_lacks_is_damage(folder):
+    paths = [folder / "first.parquet", folder / "scores.parquet"]
+    parquet.write_table(parquet.read_table(paths[1]).drop("FPR"), paths[0])
+    with pytest.raises(ResultsError, match=r"first\.parquet: damaged .no column FPR"):
+        read_parquet(paths, "scores")
 
 
 # --- How a drive's results were made: written and read back as it was -----------------------------
