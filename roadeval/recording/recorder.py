@@ -22,15 +22,7 @@ from typing import Any, Final, NamedTuple, Self
 
 import rerun as rr
 
-from roadeval.data import (
-    ERRORS,
-    FINAL_STAGE,
-    IGNORE,
-    TRUTH,
-    FrameResult,
-    Health,
-    LayerKind,
-)
+from roadeval.data import ERRORS, FINAL_STAGE, IGNORE, TRUTH, FrameResult, Health, LayerKind
 from roadeval.data.arrays import IGNORED
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT, TESTED
