@@ -208,8 +208,8 @@ def false_findings(drives: int, variants: int, rho: float = 0.8, frames: int = 9
     )
 
 
-def show(name: str, lines: Iterable[str], *, write: bool) -> None:
-    """Print a table and, where that is wanted, write it between its marks in INTERVALS.md."""
+def show(name: str, lines: Iterable[str], *, write: bool, page: Path = PAGE) -> None:
+    """Print a table and, where that is wanted, write it between its marks in a page."""
     table = []
     for line in lines:
         print(line, flush=True)
@@ -217,8 +217,8 @@ def show(name: str, lines: Iterable[str], *, write: bool) -> None:
     if write:
         block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
         text = "\n{}\n\n".format("\n".join(table))
-        page = block.sub(lambda marks: marks[1] + text + marks[2], PAGE.read_text("utf-8"))
-        PAGE.write_text(page, "utf-8")
+        written = block.sub(lambda marks: marks[1] + text + marks[2], page.read_text("utf-8"))
+        page.write_text(written, "utf-8")
 
 
 def main() -> None:

@@ -79,15 +79,11 @@ def _write_groups(command: Any, ctx: Any, formatter: Any) -> None:
             group = getattr(param, "rich_help_panel", None) or "Options"
             if param.param_type_name == "argument":
                 group, flags = "Arguments", param.metavar
-            groups.setdefault(group, []).append((flags, _in_lines(meaning)))
+            # Names in a meaning, as of presets, have a line each.
+            lines, names = re.subn(r"; (?=\w+: )", "\n", meaning)
+            groups.setdefault(group, []).append((flags, f"\b\n{lines}" if names > 1 else meaning))
     if MOST_USED in groups:
         groups = {MOST_USED: groups.pop("Arguments", []) + groups.pop(MOST_USED)} | groups
     for group, records in groups.items():
         with formatter.section(group):
             formatter.write_dl(records, FLAGS_WIDTH)
-
-
-def _in_lines(meaning: str) -> str:
-    """Return the meaning of a flag with a line for each of its names, as of presets."""
-    lines, names = re.subn(r"; (?=\w+: )", "\n", meaning)
-    return f"\b\n{lines}" if names > 1 else meaning

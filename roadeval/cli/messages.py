@@ -25,9 +25,10 @@ def error(sentence: str, draft: str = "") -> None:
         sys.stderr.write(f"\n{visible_lines(draft)}\n")
 
 
-def warning(sentence: str) -> None:
-    """Write a warning: ``roadeval: warning: ...``."""
-    _write("warning", "bold yellow", sentence)
+def warning(*sentences: str) -> None:
+    """Write warnings: ``roadeval: warning: ...``."""
+    for sentence in sentences:
+        _write("warning", "bold yellow", sentence)
 
 
 def note(sentence: str) -> None:

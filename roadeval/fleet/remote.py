@@ -37,7 +37,7 @@ from roadeval.fleet.drives import (
     scheme_of,
 )
 from roadeval.logs.log import RemoteLog
-from roadeval.results.facts import FLEET, SUMMARY
+from roadeval.results.facts import FETCHED, FLEET, SUMMARY
 from roadeval.runtime.threads import in_thread
 
 if TYPE_CHECKING:
@@ -53,8 +53,6 @@ PART: Final = 64 << 10
 ROOM: Final = 2 << 30
 """Bytes of a result that are fetched, and unpacked, at most."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
-FETCHED: Final[dict[Path, str]] = {}
-"""Public URLs of results that were fetched, by their paths."""
 _home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # until the process ends
 _POLL_S: Final = 0.2
 """Seconds between two checks for an answer."""
@@ -93,12 +91,12 @@ def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> P
 
 
 @cache
-def local_path(result: str | PathLike[str]) -> Path:
-    """Return the path of a result; the recording or the zip of one behind a URL is fetched whole.
+def fetch_result(url: str) -> Path:
+    """Fetch the recording, or the zip of a result, behind a URL whole, and return its path.
 
     A `FleetError` if it cannot be fetched or unpacked, or has more than `ROOM` bytes.
     """
-    if is_url(url := os.fspath(result)) and url.endswith("/"):
+    if is_url(url) and url.endswith("/"):
         remedy = "name a recording, or a zip"
         raise FleetError("a folder is not fetched", where=public_source(url), remedy=remedy)
     remote = open_source(url)

@@ -16,12 +16,12 @@ from roadeval.report.drawing import place_chart, range_of_frames
 from roadeval.results.facts import Reason
 from roadeval.runtime.text import as_markdown, visible
 
-_SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
+_SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg", b"\x1a\x45\xdf\xa3": "webm"}
 
 
 @dataclass(frozen=True)
 class ImageFile:
-    """The bytes of a PNG or JPEG file."""
+    """The bytes of a PNG or JPEG file, or of a WebM video."""
 
     content: bytes = field(repr=False)
 

@@ -15,7 +15,7 @@ from roadeval.evaluation.comparison.compare import Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, blocks_as_markdown
-from roadeval.report.chart import BETTER, FAINT, WORSE
+from roadeval.report.chart import BETTER, WORSE
 from roadeval.results.sentences import is_sure
 from roadeval.runtime.text import elide
 
@@ -54,7 +54,7 @@ def levels(pairs: Sequence[tuple[float, float]]) -> str:
         return ""
     bars, line = ([round(y, 2) for y in row] for row in zip(*pairs, strict=True))
     axis = f'y-axis "ERR in percent" 0 --> {max(*bars, *line, 1)}'
-    return _mermaid("", 300, (FAINT, BETTER), axis, f"bar {bars}", f"line {line}")
+    return _mermaid("", 300, ("#aaaaaa", BETTER), axis, f"bar {bars}", f"line {line}")
 
 
 def changes(rows: Sequence[tuple[str, float]]) -> str:
@@ -79,7 +79,8 @@ def _mermaid(kind: str, height: int, colours: Sequence[str], *lines: str) -> str
 
 def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskChange, str, str]:
     """Return the final mask that is surely worst, its ERR, and whether it is better or worse."""
-    by_mask = [(is_sure(row.difference[TESTED]), row) for row in comparison.finals()]
+    masks = comparison.finals() or comparison.changes
+    by_mask = [(is_sure(row.difference[TESTED]), row) for row in masks]
     sure, mask = max(by_mask, key=lambda pair: (pair[0], pair[1].difference[TESTED].mean))
     mean = mask.difference[TESTED].mean
     failed = any(limit.holds is not False for limit in limits) or (sure and mean > 0)
@@ -92,7 +93,7 @@ def badge(comparison: Comparison, limits: Sequence[Judgement]) -> str:
     """Return ERR and its change as SVG, with a title for screen readers."""
     _, text, tone = standing(comparison, limits)
     title, shown = escape(elide(f"ERR of {text}, {tone}", 200)), text.rpartition(": ")[2]
-    colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 7 * len(shown)
+    colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 6 * len(shown)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width + 48}" height="20" role="img">'
         f'<title>{title}</title><rect width="36" height="20" fill="#333"/><rect x="36" '

@@ -104,7 +104,7 @@ def comment(
     for kind in ("drives", "regions", "moved"):
         rows: Any = tuple(row for row in getattr(chief, kind) if _MASK(row) == _MASK(mask))
         chief = replace(chief, **{kind: rows})
-    first = [Heading(f"roadeval: {head}; ERR of {text}", 2), *overview(chief, judgements, 10)]
+    first = [Heading(f"roadeval: {head}; ERR of {text}"), *overview(chief, judgements, 10)]
     texts = [*map(fit, (first, changed_drives(chief, 10), _warnings(comparison)))]
     texts += [*_pictures(chief, mask, over), f"Again: {in_code(command)}\n"]
     rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
@@ -121,8 +121,8 @@ def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> lis
     old = lines.get(base if name == mask.result else f"{base}: {name}", [])
     pairs = [*zip(old, lines.get(mask.name, []), strict=False)]
     pairs = pairs or sorted(((100 * d.base, 100 * d.new) for d in chief.drives), reverse=True)
-    where = "over the drive" if old else "of the drives, sorted"
-    drawn = {f"ERR of {name} {where}: bars are {base}, the line is {mask.result}.": levels(pairs)}
+    where = "over the drive" if old else "drive by drive"
+    drawn = {f"ERR of {name}, {where}: bars are {base}, the line is {mask.result}.": levels(pairs)}
     for unit, rows in {
         "region": [(row.title, row.difference.mean) for row in chief.regions],
         "drive": [(row.drive, row.difference.mean) for row in chief.drives],

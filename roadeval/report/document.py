@@ -50,8 +50,8 @@ def document(findings: Findings | FleetFolder) -> Report:
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
     # Frames fill pages, so they come late.
-    scored = (drive.over_drive, *SCORED) if findings.totals else (drive.masks,)
-    gallery = (frames.worst_frames,) if findings.totals or findings.worst else ()
+    scored = (drive.over_drive, *SCORED) if findings.facts.totals else (drive.masks,)
+    gallery = (frames.worst_frames,) if findings.facts.totals or findings.worst else ()
     return _compose(findings, *scored, *gallery, provenance.section)
 
 
@@ -77,7 +77,7 @@ def page_document(
     if browsed and browsed.film:  # which shows more
         findings = replace(findings, thumbnails=())
     parts = (drive.masks,)
-    if findings.totals:
+    if findings.facts.totals:
         parts = (partial(drive.over_drive, heading=False), *SCORED)
     return _compose(findings, lambda _: frames.browser(browsed), *parts, provenance.section)
 
@@ -98,7 +98,7 @@ def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
 
 def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
     preset = findings.facts.run.get("preset")
-    ran = findings.finals if isinstance(findings, FleetFolder) else findings.facts.settings
+    ran = findings.facts.finals if isinstance(findings, FleetFolder) else findings.facts.settings
     if {FILTERED, UNFILTERED}.isdisjoint(ran):  # the preset's chain did not run
         preset = None
     if isinstance(findings, FleetFolder):

@@ -111,16 +111,12 @@ def write_figures(
         with mpl.rc_context(RC):  # type: ignore[arg-type]
             if examples:
                 yield f"fig2_masks{ending}", as_svg(road_masks(name, examples, width))
-            if len(windows):
-                yield f"fig3a_error_rate{ending}", as_svg(error_rate(name, windows, width))
-                yield f"fig3b_fp_fn_rate{ending}", as_svg(fp_fn_rate(name, windows, width))
+            for figure in OVER_DRIVE if len(windows) else ():
+                yield f"{figure}{ending}", as_svg(over_drive(figure, name, windows, width))
 
     def write(named_svg: tuple[str, bytes]) -> list[Path]:
         name, svg = named_svg
-        files = {folder / f"{name}.{kind}": _content(svg, kind) for kind in kinds}
-        for path, content in files.items():
-            write_file(path, content)
-        return list(files)
+        return [write_file(folder / f"{name}.{kind}", _content(svg, kind)) for kind in kinds]
 
     # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
     # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.
@@ -158,29 +154,28 @@ _LONGEST: Final = 80
 """Letters of a variant's name that fit in a line of the legend."""
 
 
-def error_rate(drive: str, windows: pd.DataFrame, width: float = WIDTH) -> Figure:
-    """Draw figure 3a of the paper: the error rate over the drive, in rows of ten frames.
+ERROR_RATE: Final = "fig3a_error_rate"
+FP_FN_RATE: Final = "fig3b_fp_fn_rate"
+OVER_DRIVE: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
+    ERROR_RATE: ("Error rate", {TESTED: "ERR: wrong pixels"}),
+    FP_FN_RATE: (
+        "False positive and false negative rate",
+        {
+            "FPR": "False positives (FPR)\nnon-road called road",
+            "FNR": "False negatives (FNR)\nroad not found",
+        },
+    ),
+}
+"""The titles, rates and labels of the paper's figures 3a and 3b, by the names of their files."""
+
+
+def over_drive(name: str, drive: str, windows: pd.DataFrame, width: float = WIDTH) -> Figure:
+    """Draw a figure of `OVER_DRIVE`: each variant's final mask, one rate below the other.
 
     Without the name of a ``drive`` a figure has no title.
     """
-    title = f"Error rate on {drive}" if drive else ""
-    return _over_drive(title, windows, {TESTED: "ERR: wrong pixels"}, width)
-
-
-def fp_fn_rate(drive: str, windows: pd.DataFrame, width: float = WIDTH) -> Figure:
-    """Draw figure 3b of the paper: both kinds of error over the drive, in rows of ten frames."""
-    rates = {
-        "FPR": "False positives (FPR)\nnon-road called road",
-        "FNR": "False negatives (FNR)\nroad not found",
-    }
-    title = f"False positive and false negative rate on {drive}" if drive else ""
-    return _over_drive(title, windows, rates, width)
-
-
-def _over_drive(
-    title: str, windows: pd.DataFrame, rates: Mapping[str, str], width: float
-) -> Figure:
-    """Draw the rates of every variant's final mask over the drive, one rate below the other."""
+    what, rates = OVER_DRIVE[name]
+    title = f"{what} on {drive}" if drive else ""
     charts, across = over_windows(windows, [*rates]), width - AXIS - EDGE
     stages = ", ".join(values_of(finals(windows), "stage"))
     about = f"Final mask ({stages}); {describe_points(windows, CROWDED)}; lower is better."

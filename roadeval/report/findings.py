@@ -21,7 +21,7 @@ from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.tables import group_rows, only, values_of
 from roadeval.report.charts.standard import Interval
 from roadeval.report.images import ExampleFrame, LayerImage
-from roadeval.results.facts import Facts, Totals
+from roadeval.results.facts import Facts
 from roadeval.results.tables import read_table
 
 if TYPE_CHECKING:
@@ -103,19 +103,9 @@ class Findings:
         """Height of the frames in pixels."""
         return self.facts.drive.height
 
-    @property
-    def totals(self) -> Totals:
-        """Counts and rates by variant and stage."""
-        return self.facts.totals
-
-    @property
-    def finals(self) -> Mapping[str, str]:
-        """Each scored variant's final stage."""
-        return self.facts.finals
-
     def total(self, variant: str) -> Mapping[str, Any]:
         """Return the counts and rates of a variant's final mask."""
-        return self.totals[variant][self.finals[variant]]
+        return self.facts.totals[variant][self.facts.finals[variant]]
 
     @cached_property
     def windows(self) -> pd.DataFrame:

@@ -44,7 +44,7 @@ Rows = list[list[Cell | str]]
 def document(history: History) -> Report:
     """Return a history as a document."""
     runs = history.runs
-    by_variant = sorted(history.lines, key=lambda line: line.variant != history.focus)
+    lost = [BulletList("Left out", history.lost, "warning")] if history.lost else []
     return Report(
         kicker="roadeval history",
         title=f"{counted(len(runs), 'run')}: {history.focus}",
@@ -52,12 +52,15 @@ def document(history: History) -> Report:
         footer=f"history of {history.focus}",
         blocks=[
             Heading("Since when"),
-            *overview(history),
+            Text(verdict(history), "verdict"),
+            *limits(history.judgements),
+            *lost,
             *(_details(history, event) for event in reversed(history.events)),
+            note("steps"),
             Heading("Over the runs"),
             *_figures(history),
             Heading("All rates"),
-            rates_table(by_variant),
+            rates_table(sorted(history.lines, key=lambda line: line.variant != history.focus)),
             _drives_table(history),
             Heading("The runs"),
             _runs_table(history),
@@ -73,31 +76,6 @@ def markdown(history: History) -> str:
         for block in document(history).blocks
     )
     return f"# roadeval history\n\n{blocks_as_markdown(chain.from_iterable(opened))}"
-
-
-def overview(history: History) -> Iterator[Block]:
-    """Yield the verdict, the limits, the events, and what could not be read."""
-    yield Text(f"{verdict(history)}", "verdict")
-    yield from limits(history.judgements)
-    if history.lost:
-        yield BulletList("Left out", history.lost, "warning")
-    if history.events:
-        yield events_table(history)
-        yield note("steps")
-
-
-def events_table(history: History) -> Table:
-    """Tabulate the events, the newest first."""
-    rows: Rows = []
-    for event in reversed(history.events):
-        change, difference = event.first, event.first.difference
-        title = f"{change.line.title} of {change.line.variant}"
-        cells = points(difference.mean), marked_interval(difference)
-        reasons = "; ".join(event.reasons[:2])
-        name = history.runs[event.run].name
-        rows.append([name, change.step.kind, title, *cells, reasons])
-    columns = ["run", "kind", "rate", "change", "interval", "what changed there"]
-    return Table(columns, rows, text_columns=(0, 1, 2, 5), small=True)
 
 
 def rates_table(lines: Sequence[Line]) -> Table:

@@ -78,10 +78,8 @@ def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
         pictures = {"camera image": image}
         for name in names:
             mask = example.masks.get(name)
-            if mask is None:
-                pictures[name] = fade(image)
-            else:
-                pictures[name] = paint(LayerImage(name, image, ROAD, mask))
+            there = fade(image) if mask is None else image
+            pictures[name] = paint(LayerImage(name, there, ROAD, mask))
         if labelled:
             pictures["truth"] = paint(LayerImage("truth", image, TRUTH, example.truth))
         yield pictures
@@ -135,8 +133,7 @@ def _paint_map(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
     low, high = spec.value_range
     codes = np.clip((values - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
     bgr = cv2.applyColorMap(codes, cv2.COLORMAP_VIRIDIS)
-    rgb: Rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
-    return rgb
+    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
 def _overlay(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
@@ -190,5 +187,4 @@ def shrink(
         return image
     size = width, max(round(height * width / wide), 1)
     method = cv2.INTER_NEAREST if labels else cv2.INTER_AREA
-    small: npt.NDArray[np.uint8] = cv2.resize(image, size, interpolation=method)
-    return small
+    return cv2.resize(image, size, interpolation=method)

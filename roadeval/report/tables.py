@@ -6,17 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
-from roadeval.data.words import (
-    DASH,
-    MINUS,
-    defined,
-    in_percent,
-    listing,
-    number,
-    percent,
-    points,
-    short_names,
-)
+from roadeval.data import words
+from roadeval.data.words import DASH, MINUS, defined, in_percent, number, percent, points
 from roadeval.evaluation.metrics import FULL, METRICS, SHORT, SHORT_UNTABLED, TESTED, UNTABLED
 from roadeval.report.blocks import Cell, Table
 from roadeval.report.captions import caption
@@ -33,10 +24,14 @@ def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
     return Cell(text or name, look=looks(names)[name])
 
 
+def breaks_of(rows: Sequence[Sequence[Cell | str]]) -> list[int]:
+    """Return the rows that begin a part of a table, behind the first: they have a first cell."""
+    return [place for place, row in enumerate(rows) if place and row[0]]
+
+
 def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
     """Yield a cell in percent for each value; the best one is bold."""
-    defined_values = [value for value in values if defined(value)]
-    best = (max if higher else min)(defined_values, default=None)
+    best = (max if higher else min)(filter(defined, values), default=None)
     place = None if best is None else values.index(best)
     yield from (Cell(percent(value), bold=i == place) for i, value in enumerate(values))
 
@@ -63,7 +58,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
         sentences = [caption("rates of a fleet")]
     else:
         frames = counts[0] if alike else "the evaluated"
-        sentences = [caption("rates", frames=frames, untabled=listing([*UNTABLED]))]
+        sentences = [caption("rates", frames=frames, untabled=words.listing([*UNTABLED]))]
         if widths := {measured["width"] for measured in facts.beyond.values()}:
             for name in ("boundary_F", "boundary_IoU"):
                 values = [facts.beyond.get(variant, {}).get(name) for variant in finals]
@@ -84,29 +79,25 @@ def stages_table(
     totals: Totals, changes: Mapping[tuple[str, str], Sequence[float]] | None = None
 ) -> Table:
     """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
-    rows: list[list[Cell | str]] = []
-    breaks = []
-    for variant, stages in totals.items():
-        breaks.append(len(rows))
-        for place, (stage, total) in enumerate(stages.items()):
-            rows.append(
-                [
-                    "" if place else variant_cell(variant, [*totals]),
-                    stage,
-                    number(total["frames"]),
-                    *(percent(total.get(n)) for n in FULL),
-                    *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_UNTABLED)),
-                ]
-            )
-            if changes:
-                rows[-1] += map(percent, changes.get((variant, stage), (None, None)))
+    rows: list[list[Cell | str]] = [
+        [
+            "" if place else variant_cell(variant, [*totals]),
+            stage,
+            number(total["frames"]),
+            *(percent(total.get(n)) for n in FULL),
+            *(percent(total.get(f"pooled_{n}")) for n in (TESTED, *SHORT_UNTABLED)),
+            *(map(percent, changes.get((variant, stage), (None, None))) if changes else ()),
+        ]
+        for variant, stages in totals.items()
+        for place, (stage, total) in enumerate(stages.items())
+    ]
     changed = ["repaired", "spoiled"] if changes else []
     meanings = "; ".join(f"{name}: {metric.in_words}" for name, metric in SHORT.items())
     return Table(
         ["variant", "stage", "frames", *FULL, "pooled ERR", *SHORT_UNTABLED, *changed],
         rows,
         text_columns=(0, 1),
-        breaks=breaks[1:],
+        breaks=breaks_of(rows),
         caption=f"Percent. {meanings}.",
         small=True,
     )
@@ -123,14 +114,14 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
     unit = effects[0].rates[TESTED].unit
     rows: list[list[Cell | str]] = []
     for effect in effects:
-        change, words = effect.rates[TESTED], f"{effect.variant} {MINUS} {effect.base}"
+        change, title = effect.rates[TESTED], f"{effect.variant} {MINUS} {effect.base}"
         ends = [percent(errors[name]) for name in (effect.base, effect.variant)]
         won = [number(count or 0) for count in (change.better, change.worse)]
         if unit == "frames":
             won.append(DASH if change.effective is None else f"{change.effective:.0f}")
         rows.append(
             [
-                variant_cell(effect.variant, names, words),
+                variant_cell(effect.variant, names, title),
                 *([] if brief else ends),
                 points(change.mean),
                 marked_interval(change),
@@ -177,7 +168,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
 
 def cameras_table(facts: Facts) -> Table:
     """Tabulate ERR of each camera's final masks, and the first difference within each camera."""
-    names, masks = short_names([*facts.cameras]), [*facts.finals]
+    names, masks = words.short_names([*facts.cameras]), [*facts.finals]
     pairs = [(effect.variant, effect.base) for effect in facts.final_effects[:1]]
     rows: list[list[Cell | str]] = []
     for camera, of_camera in facts.cameras.items():

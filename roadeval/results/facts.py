@@ -36,6 +36,8 @@ from roadeval.runtime.text import elide, visible, visible_lines
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; it is written last."""
+FETCHED: Final[dict[Path, str]] = {}
+"""Public URLs of results that were fetched, by their paths."""
 
 
 def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:

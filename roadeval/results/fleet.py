@@ -220,11 +220,6 @@ class FleetFolder:
         times = Counter(names.values())
         return {drive: name if times[name] == 1 else drive for drive, name in names.items()}
 
-    @property
-    def finals(self) -> dict[str, str]:
-        """Each scored variant's final stage."""
-        return self.facts.finals
-
     @cached_property
     def scores(self) -> pd.DataFrame:
         """The rows of ``scores``."""

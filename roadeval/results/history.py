@@ -146,9 +146,10 @@ def verdict(history: History) -> str:
     most = max(parts, key=lambda part: abs(part.difference.mean), default=first)
     if abs(most.difference.mean) > 1.5 * abs(first.difference.mean):
         text += f"; most of all {most.line.title} ({points(most.difference.mean)})"
+    text += f". Changed there: {'; '.join(ranked[0].reasons[:2])}"
     if not standing:
-        return f"{text}: the last change in {count}."
-    more = f", as {len(ranked) - 1} more changes to the worse" if len(ranked) > 1 else ""
+        return f"{text}. It is the last change in {count}."
+    more = f", nor {counted(len(ranked) - 1, 'other rise')}" if len(ranked) > 1 else ""
     return f"{text}. No later run has undone it{more}."
 
 

@@ -167,11 +167,8 @@ def _totals(scores: pd.DataFrame) -> Totals:
     means = by_mask[[*METRICS]].mean().join(rates_of(sums, METRICS, "pooled_"))
     means.insert(0, "drives", by_mask.size())
     means.insert(1, "frames", sums["frames"])
-    totals: Totals = {}
-    rows: dict[Any, Any] = means.to_dict("index")
-    for (variant, stage), row in rows.items():
-        totals.setdefault(variant, {})[stage] = row
-    return totals
+    by_variant = means.groupby(level="variant", sort=False)
+    return {name: rows.droplevel("variant").to_dict("index") for name, rows in by_variant}
 
 
 def _warnings_of_copies(

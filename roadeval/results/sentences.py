@@ -96,18 +96,19 @@ def misfit(finding: Finding, period_ms: float | None, remedy: str) -> str:
     >>> misfit(Finding("truth", Misfit.LAG, frames=3), 100, "Set `truth.first` to 3.")
     'The truth is 3 frames (300 ms) late: it fits earlier images better. Set `truth.first` to 3.'
     """
-    subject, verb = ("The truth", "is") if finding.subject == TRUTH else (None, "are")
-    subject = subject or f"The masks of {finding.subject}"
+    subject, verb, it = "The truth", "is", "it fits"
+    if finding.subject != TRUTH:
+        subject, verb, it = f"The masks of {finding.subject}", "are", "they fit"
     match finding.misfit:
         case Misfit.LAG:
             size = abs(finding.frames)
             time = f" ({size * period_ms:.0f} ms)" if period_ms else ""
             word, which = ("late", "earlier") if finding.frames > 0 else ("early", "later")
-            what = f"{counted(size, 'frame')}{time} {word}: {_it(verb)} {which} images better"
+            what = f"{counted(size, 'frame')}{time} {word}: {it} {which} images better"
         case Misfit.MIRRORED:
-            what = f"mirrored: with left and right exchanged {_it(verb)} the images better"
+            what = f"mirrored: with left and right exchanged {it} the images better"
         case Misfit.UPSIDE_DOWN:
-            what = f"upside down: turned over {_it(verb)} the images better"
+            what = f"upside down: turned over {it} the images better"
         case Misfit.INVERTED:
             what = (
                 "inverted, or of another class: road is high in the image, not before the vehicle"
@@ -115,12 +116,8 @@ def misfit(finding: Finding, period_ms: float | None, remedy: str) -> str:
         case _:
             ways = ((finding.right, "right", "left"), (finding.down, "down", "up"))
             parts = [f"{abs(n)} pixels {more if n > 0 else less}" for n, more, less in ways if n]
-            what = f"moved by {' and '.join(parts)}: moved back {_it(verb)} images and truth better"
+            what = f"moved by {' and '.join(parts)}: moved back {it} images and truth better"
     return Sentence("{} {} {}. {}", subject, verb, what, remedy)
-
-
-def _it(verb: str) -> str:
-    return "it fits" if verb == "is" else "they fit"
 
 
 def describe_overconfidence(curves: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:

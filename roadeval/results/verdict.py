@@ -201,13 +201,13 @@ def _points(change: Difference, name: str, *, alone: bool = False) -> str:
     """
     if change.is_zero:
         return f"exactly as good as {name}"
-    doubt, digits = "", 1 if abs(change.mean) >= FINE else 2
-    if not alone and change.low is not None and change.high is not None:
-        least, most = (_size(end, digits) for end in _ends(change))
-        doubt = f" ({least}{DASH}{most} on others)"
-        doubt = doubt if is_sure(change) else " (may be chance)"
+    doubt = ""
+    if not alone and change.low is not None:
+        doubt = (
+            f" ({DASH.join(_ends(change))} on others)" if is_sure(change) else " (may be chance)"
+        )
     direction = "worse" if change.mean > 0 else "better"
-    return f"{_size(change.mean, digits)} points{doubt} {direction} than {name}"
+    return f"{_size(change.mean, change)} points{doubt} {direction} than {name}"
 
 
 def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, Rates]) -> str:
@@ -230,15 +230,12 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
     if change.better is not None:
         here += f", better on {change.better}, worse on {change.worse}"
     before, after = (rates.get(TESTED) for rates in ends)
-    digits = 1 if abs(change.mean) >= FINE else 2
+    size = f"by {_size(change.mean, change)} points"
     if defined(before) and defined(after) and abs(after - before - change.mean) < ROUNDING:
-        size = f"{_size(after, digits)} % wrong instead of {_size(before, digits)} %"
-    else:
-        size = f"by {_size(change.mean, digits)} points"
+        size = f"{_size(after, change)} % wrong instead of {_size(before, change)} %"
     direction, doubt = "worse" if change.mean > 0 else "better", _no_interval(change)
     if not doubt and is_sure(change):
-        least, most = (_size(end, digits) for end in _ends(change))
-        doubt = f"On others by {least} to {most} points."
+        doubt = f"On others by {' to '.join(_ends(change))} points."
     elif not doubt:
         family = ""
         if is_sure(replace(change, p_holm=None)):
@@ -247,15 +244,15 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
     return f"{new} is {direction} than {base}: {size} ({here}). {doubt}"
 
 
-def _ends(change: Difference) -> list[float]:
-    """Return the ends of an interval, the one nearer to 0 first."""
-    assert change.low is not None
-    assert change.high is not None
-    return sorted((change.low, change.high), key=abs)
+def _ends(change: Difference) -> list[str]:
+    """Return the ends of a difference's interval in percent, the one nearer to 0 first."""
+    ends = sorted((change.low or 0.0, change.high or 0.0), key=abs)
+    return [_size(end, change) for end in ends]
 
 
-def _size(fraction: float, digits: int) -> str:
-    return f"{abs(in_percent(fraction)):.{digits}f}"
+def _size(fraction: float, change: Difference) -> str:
+    """Return the size of a fraction in percent, with two digits beside a fine difference."""
+    return f"{abs(in_percent(fraction)):.{1 if abs(change.mean) >= FINE else 2}f}"
 
 
 def _next_step(

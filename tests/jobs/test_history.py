@@ -78,8 +78,9 @@ def test_recordings_and_folders_of_one_run_are_not_taken_twice(nights, tmp_path)
     assert find_results(folder) == [folder / "0"]
     shutil.rmtree(folder / "0")
     assert find_results(folder) == [folder / "0.rrd"]
+    (folder / "0.rrd").unlink()
     with pytest.raises(RoadevalError, match="holds no results"):
-        find_results(nights / "0" / "results" / "empty")
+        find_results(folder)
 
 
 def test_a_drive_that_has_gone_and_classes_are_told(nights, tmp_path):

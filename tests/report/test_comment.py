@@ -72,7 +72,7 @@ def test_a_comment_fits_whatever_comes_in_and_says_what_is_left_out(name):
     limit = Condition.parse("post.v1.ERR > +0.5pp")
     text = comment(comparison, [*judge(comparison, [limit], EvaluationSettings())], [], name)
     assert len(text.encode()) <= MOST
-    first = "### roadeval: failed, 1 of 1 limits exceeded: post.v1.ERR > +0.5pp; ERR of v0: 11.2 %"
+    first = "## roadeval: failed, 1 of 1 limits exceeded: post.v1.ERR > +0.5pp; ERR of v0: 11.2 %"
     assert text.startswith(first)
     assert "| v0 | post | ERR |" in text
     assert "Left out here: " in text
@@ -94,6 +94,12 @@ def test_a_badge_has_a_colour_for_better_worse_and_chance_and_a_title(change, co
     assert colour in svg
     assert f"{title}</title>" in svg
     ElementTree.fromstring(svg)
+
+
+def test_results_without_a_final_mask_in_common_have_a_comment_all_the_same():
+    text = comment(a_comparison(a_change(WORSE, final=False)), [], [], "roadeval compare a b")
+    assert text.startswith("## roadeval: worse; ERR of filtered: 11.2 % (+1.2 pp)\n")
+    assert "\nAgain: `roadeval compare a b`\n" in text
 
 
 def test_a_badge_is_red_if_a_limit_cannot_be_judged():

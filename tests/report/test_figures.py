@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from io import BytesIO
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -22,12 +21,13 @@ from pypdf import PdfReader
 from roadeval.report.figures import (
     CROWDED,
     DPI,
+    ERROR_RATE,
+    FP_FN_RATE,
     MARKED,
     RC,
     FigurePicture,
     as_svg,
-    error_rate,
-    fp_fn_rate,
+    over_drive,
     road_masks,
     write_figures,
 )
@@ -97,13 +97,13 @@ def pictures(figure: Figure) -> list[list[np.ndarray]]:
 
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
-    fpr, fnr = draw(fp_fn_rate("drive", table)).axes
+    fpr, fnr = draw(over_drive(FP_FN_RATE, "drive", table)).axes
     assert not fpr.texts
     assert fnr.texts[0].get_text() == "undefined on every frame"
 
 
 def test_variants_are_named_by_what_they_do() -> None:
-    names = texts(error_rate("drive", a_table(3, ["filtered", "blind", "n" * 100])))
+    names = texts(over_drive(ERROR_RATE, "drive", a_table(3, ["filtered", "blind", "n" * 100])))
     assert "filtered: with the shadow filter" in names
     assert "blind: never looks at the image" in names
     assert "n" * 81 not in names
@@ -111,7 +111,7 @@ def test_variants_are_named_by_what_they_do() -> None:
 
 def test_a_long_drive_is_drawn_as_means_of_rows_with_some_marks() -> None:
     table = a_table(3600)
-    figure = error_rate("drive", table)
+    figure = over_drive(ERROR_RATE, "drive", table)
     *_, line = figure.axes[0].lines
     assert len(line.get_ydata()) == CROWDED
     assert CROWDED / line.get_markevery() == MARKED
@@ -121,7 +121,7 @@ def test_a_long_drive_is_drawn_as_means_of_rows_with_some_marks() -> None:
 
 
 def test_the_legend_reads_row_by_row_in_the_order_of_the_variants() -> None:
-    figure = error_rate("", a_table(3, [*"abcd"]))
+    figure = over_drive(ERROR_RATE, "", a_table(3, [*"abcd"]))
     names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     # Matplotlib fills three columns, one after the other, with two, one and one.
     assert names == ["a", "d", "b", "c"]
@@ -129,16 +129,16 @@ def test_the_legend_reads_row_by_row_in_the_order_of_the_variants() -> None:
 
 @pytest.mark.parametrize(("last", "said"), [(10, ""), (4, ", the last of 4")])
 def test_a_short_last_point_is_marked_and_said(last: int, said: str) -> None:
-    figure = fp_fn_rate("drive", a_table(3, last=last))
+    figure = over_drive(FP_FN_RATE, "drive", a_table(3, last=last))
     assert f"is the mean of 10 frames{said};" in texts(figure)
     assert ("mean of 4" in texts(figure)) == bool(said)
     spans = [[round(p.get_x(), 1), p.get_width()] for ax in figure.axes for p in ax.patches]
     assert spans == [[19.5, 4]] * len(figure.axes) * bool(said)
 
 
-@pytest.mark.parametrize("draw_it", [error_rate, fp_fn_rate])
-def test_a_figure_for_a_column_has_its_width_and_no_words_above(draw_it: Any) -> None:
-    figure = draw_it("", a_table(3, last=4), 3.35)
+@pytest.mark.parametrize("name", [ERROR_RATE, FP_FN_RATE])
+def test_a_figure_for_a_column_has_its_width_and_no_words_above(name: str) -> None:
+    figure = over_drive(name, "", a_table(3, last=4), 3.35)
     assert figure.get_figwidth() == 3.35
     assert not figure.texts
     FigureCanvasAgg(figure).draw()
@@ -190,7 +190,7 @@ def test_a_png_shows_what_matplotlib_would_save(tmp_path: Path) -> None:
     write_figures(tmp_path, "drive", windows, [])
     typst = Image.open(tmp_path / "fig3a_error_rate.png")
     content = BytesIO()
-    error_rate("drive", windows).savefig(content, format="png", dpi=DPI)
+    over_drive(ERROR_RATE, "drive", windows).savefig(content, format="png", dpi=DPI)
     matplotlib = Image.open(content)
     assert typst.size == matplotlib.size
     assert typst.mode == "RGB" or typst.getextrema()[3] == (255, 255), "nothing shines through"

@@ -42,7 +42,5 @@ def info(
         console.emit(json_text(log.as_dict()).rstrip())
     else:
         screen.show(log, console.results())
-    for damage in log.damage:
-        if damage not in log.losses:
-            messages.warning(damage)
+    messages.warning(*(damage for damage in log.damage if damage not in log.losses))
     return messages.losses(log.losses)

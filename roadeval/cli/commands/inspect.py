@@ -71,8 +71,7 @@ def inspect(
         _list(opened, worst, as_json=json)
     else:
         _show(opened, frame, worst, file=screenshot)
-    for warning in opened.warnings:
-        messages.warning(warning)
+    messages.warning(*opened.warnings)
     return ExitCode.DONE
 
 

@@ -36,8 +36,7 @@ def pack(
     from roadeval.jobs.log_files import pack as run
 
     packed = run(images, output, truth=truth, rate_hz=rate)
-    for warning in packed.warnings:
-        messages.warning(warning)
+    messages.warning(*packed.warnings)
     if not quiet:
         masks = f", {packed.labelled} with a mask" if packed.labelled else ""
         console.say(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")

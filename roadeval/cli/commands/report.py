@@ -84,8 +84,7 @@ def report(
             paths.append(write_report(opened, output, on_progress=watch))
     for path in paths if not quiet else ():
         console.emit(str(path))
-    for warning in opened.warnings:
-        messages.warning(warning)
+    messages.warning(*opened.warnings)
     if open_report:
         typer.launch(str(paths[-1]))
     return ExitCode.DONE

@@ -46,8 +46,7 @@ def train(
     with progress.show(quiet) as watch:
         model = run(paths, output, config, on_progress=watch)
     messages.warn_of_missing_loops()
-    for warning in model.warnings:
-        messages.warning(warning)
+    messages.warning(*model.warnings)
     if not quiet:
         console.say(
             f"{output}: {', '.join(model.parameters)}; trained on {len(model.digests)} frames, "

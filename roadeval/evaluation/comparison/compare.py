@@ -9,7 +9,6 @@ If one drive is compared, intervals are over its frames; if several are, over dr
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,20 +20,14 @@ import numpy as np
 from roadeval.data import BASELINE, UNFILTERED
 from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import metrics
+from roadeval.evaluation import metrics, tables
+from roadeval.evaluation.comparison import pairing
 from roadeval.evaluation.comparison.pairing import (
     ComparedDrive,
     Disagreement,
     MovedFrame,
     Pair,
     Side,
-    common_masks,
-    common_regions,
-    disagreements,
-    left_out,
-    match_drives,
-    moved_frames,
-    truth_differs,
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.regions import titles
@@ -46,19 +39,7 @@ from roadeval.evaluation.stats.difference import (
     over_drives,
     within_drive,
 )
-from roadeval.evaluation.tables import (
-    COUNTS,
-    KEY,
-    MASK,
-    by_class,
-    concatenate,
-    group_rows,
-    is_final,
-    keys_of,
-    only,
-    rates_of,
-    values_of,
-)
+from roadeval.evaluation.tables import COUNTS, KEY, MASK, group_rows, only, rates_of, values_of
 from roadeval.runtime.sentence import Sentence, Setting
 from roadeval.runtime.text import likely
 
@@ -251,7 +232,7 @@ def compare(
     base, *others = sides
     parts = []
     for new in others:
-        old, (matched, left) = base, match_drives(base, new)
+        old, (matched, left) = base, pairing.match_drives(base, new)
         if across_variants:
             old = replace(base, variants={base.label: new.label})
             matched, left = [(drive, drive) for drive in base.scored], []
@@ -312,28 +293,28 @@ def _compare_two(
     for batch in _batches(new.scored):
         new_rows = new.table("frames", {key: key for key in batch})
         frames["new"] += _count_frames(new_rows)
-        levels.append(by_drive(new_rows.assign(final=is_final(new_rows)), MASK, groups))
+        levels.append(by_drive(new_rows.assign(final=tables.is_final(new_rows)), MASK, groups))
         new_keys = {base_keys[key]: key for key in batch if key in base_keys}
         if not new_keys:
             continue
         base_rows = base.table("frames", new_keys)
         frames["base"] += _count_frames(base_rows)
-        pairs = common_masks(base_rows, new_rows)
-        common = {*keys_of(pairs)[0]}
+        pairs = pairing.common_masks(base_rows, new_rows)
+        common = {*tables.keys_of(pairs)[0]}
         without_frames += [drive_names[key] for key in new_keys.values() if key not in common]
         if not common:
             continue
         base_rows, new_rows = (_of_drives(rows, common) for rows in (base_rows, new_rows))
         frames["only base"] += _count_frames(base_rows) - _count_frames(pairs, "_base")
         frames["only new"] += _count_frames(new_rows) - _count_frames(pairs)
-        frames["relabelled"] += truth_differs(base_rows, new_rows)
+        frames["relabelled"] += pairing.truth_differs(base_rows, new_rows)
         masks.append(by_drive(pairs, MASK, groups))
         finals = only(pairs, final=True)
         finals = finals[finals["variant"] != BASELINE]
         if several:
             drives += _drive_changes(new.label, drive_names, finals, settings)
         new_regions = new.table("regions", {key: key for key in new_keys.values()})
-        parts = common_regions(finals, new_regions, base.table("regions", new_keys))
+        parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups))
     if not masks:
         raise ComparisonError(
@@ -343,7 +324,7 @@ def _compare_two(
     one_camera = len(matched) == 1  # then a number names a frame
     disagreed: Iterator[Disagreement] = iter(())
     if one_camera and across_variants:
-        disagreed = disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
+        disagreed = pairing.disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
     of_masks, of_regions = (None, None) if several else (pairs, parts)
     changed = changed_settings(matched)
     old_classes = base.table("classes", {old: key for key, old in base_keys.items()})
@@ -358,7 +339,7 @@ def _compare_two(
         levels=tuple(_mask_changes(new.label, pd.concat(levels), None, settings)),
         drives=tuple(_rank_drives(drives)),
         regions=tuple(_region_changes(new.label, pd.concat(regions), of_regions, settings)),
-        moved=tuple(moved_frames(new.label, pairs)) if one_camera else (),
+        moved=tuple(pairing.moved_frames(new.label, pairs)) if one_camera else (),
         disagreements=tuple(disagreed),
         warnings=tuple(_warnings(labels, without_frames, frames, changed)),
         settings=settings,
@@ -368,11 +349,11 @@ def _compare_two(
 
 def _class_changes(label: str, base: pd.DataFrame, new: pd.DataFrame) -> Iterator[ClassChange]:
     """Yield the shares of the false road that are at least a hundredth; one may lack the names."""
-    both = concatenate([base.assign(side="base"), new.assign(side="new")])
+    both = tables.concatenate([base.assign(side="base"), new.assign(side="new")])
     names = both["name"].astype(str).replace("", None)
     both["name"] = names.fillna(names.groupby(both["class"]).transform("last")).fillna("")
     for variant in [name for name in values_of(new, "variant") if name != BASELINE]:
-        sides = (by_class(only(both, variant=variant, side=side)) for side in ("base", "new"))
+        sides = (tables.by_class(only(both, variant=variant, side=s)) for s in ("base", "new"))
         before, after = (shares["false"][shares["truth"] == "other"] for shares in sides)
         shares = after.to_frame("new").join(before.rename("base"), how="outer").fillna(0)
         if before.isna().all() or after.isna().all() or shares["new"].equals(shares["base"]):
@@ -420,7 +401,7 @@ def _batches(drives: Sequence[ComparedDrive]) -> Iterator[list[tuple[str, str]]]
 
 
 def _of_drives(rows: pd.DataFrame, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
-    keys, places = keys_of(rows)
+    keys, places = tables.keys_of(rows)
     return rows[np.array([key in drives for key in keys], bool)[places]]
 
 
@@ -451,8 +432,7 @@ def by_drive(
 
 def _means(drives: pd.DataFrame, names: Sequence[str]) -> list[float]:
     """Average drives as their differences are, so that these lie between two rates."""
-    means: list[float] = drives.groupby("group")[[*names]].mean().mean().tolist()
-    return means
+    return drives.groupby("group")[[*names]].mean().mean().tolist()
 
 
 def _difference(
@@ -534,8 +514,7 @@ def _rank_drives(changes: Sequence[DriveChange]) -> Iterator[DriveChange]:
     """Yield the changes on drives, corrected for their number, the surest of each mask first."""
 
     def surest_first(change: DriveChange) -> tuple[float, float, str]:
-        mean = change.difference.mean
-        size = 0.0 if math.isnan(mean) else abs(mean)
+        size = abs(np.nan_to_num(change.difference.mean))
         return 2.0 if change.q is None else change.q, -size, change.drive
 
     for mask in dict.fromkeys((change.variant, change.stage) for change in changes):
@@ -562,7 +541,7 @@ def _warnings(
     """Yield what was left out, and what makes the two less comparable than they look."""
     base, new = labels
     if without_frames:
-        yield left_out(without_frames, new, f"no evaluated frame in common with {base}")
+        yield pairing.left_out(without_frames, new, f"no evaluated frame in common with {base}")
     for label, other, lost in ((base, new, "only base"), (new, base, "only new")):
         if count := frames[lost]:
             yield (

@@ -11,19 +11,9 @@ import numpy as np
 
 from roadeval.data.words import first_of
 from roadeval.errors import RoadevalError
+from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import METRICS, TESTED
-from roadeval.evaluation.tables import (
-    COUNTS,
-    KEY,
-    MASK,
-    group_rows,
-    is_final,
-    keys_of,
-    most_changed_frames,
-    only,
-    pair_rows,
-    rates_of,
-)
+from roadeval.evaluation.tables import COUNTS, KEY, MASK, group_rows, only, pair_rows, rates_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +63,7 @@ class Side:
         """
         rows = self.tables(name, drives)
         if isinstance(drives, Mapping):
-            keys, places = keys_of(rows)
+            keys, places = tables.keys_of(rows)
             if unknown := {*keys} - drives.keys():
                 key = " ".join(min(unknown))
                 raise RoadevalError(f"a table has rows of {key}, which is not compared")
@@ -164,7 +154,7 @@ def common_masks(base: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
     """
 
     def with_step(table: pd.DataFrame) -> pd.DataFrame:
-        final = is_final(table)
+        final = tables.is_final(table)
         return table.assign(final=final, step=np.where(final, "", table["stage"].astype(str)))
 
     return pair_rows(
@@ -247,7 +237,7 @@ def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
     base = pairs[f"{TESTED}_base"]
     pairs = pairs.assign(before=base, change=pairs[TESTED] - base)
     for harmed in (True, False):
-        for row in most_changed_frames(pairs, NAMED, harmed=harmed).to_dict("records"):
+        for row in tables.most_changed_frames(pairs, NAMED, harmed=harmed).to_dict("records"):
             was, change = row["before"], row["change"]
             about = row["variant"], row["frame"], row["stamp_ns"]
             yield MovedFrame(result, *about, was, was + change, change)
@@ -267,6 +257,6 @@ def disagreements(
         rows = rows[rows["N"] > 0].merge(stamps, on="frame")
         mine, theirs = rows[new_right] / rows["N"], rows[base_right] / rows["N"]
         rows = rows.assign(mine=mine, theirs=theirs, change=mine + theirs)
-        for row in most_changed_frames(rows, NAMED, harmed=True).to_dict("records"):
+        for row in tables.most_changed_frames(rows, NAMED, harmed=True).to_dict("records"):
             right = row["theirs"], row["mine"]
             yield Disagreement(new, new, row["frame"], row["stamp_ns"], *right)

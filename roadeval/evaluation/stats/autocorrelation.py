@@ -35,8 +35,6 @@ from roadeval.data.arrays import Floats
 
 _TAIL: Final = 0.025
 """Student's distribution and the mixture have the same tails of this probability."""
-
-
 _SHARES: Final = (1, 0.95, 0.75, 0.5, 0.25)
 """The autoregression's shares of the variance that are tried."""
 
@@ -147,8 +145,7 @@ def _models(n: int) -> tuple[Floats, Floats, Floats]:
 
 def _distances(n: int) -> Floats:
     """Return the coefficients that are tried, as their distances from 1."""
-    distances: Floats = (10.0 * n) ** -np.linspace(0, 1, 48)
-    return distances
+    return np.asarray((10.0 * n) ** -np.linspace(0, 1, 48))
 
 
 def _variances_of_sum(factors: Floats) -> Floats:
@@ -173,5 +170,4 @@ def cosine_variances(coefficients: Floats, count: int, n: int) -> Floats:
     gain = (1 - r) ** 2 + 4 * r * np.sin(angle / 2) ** 2
     alternating = r**n * np.where(numbers % 2, -1, 1)
     ends = np.where(numbers, 4, 2) * r / n * ((1 - r) * np.cos(angle / 2)) ** 2 * (1 - alternating)
-    variances: Floats = (1 - r**2) / gain - ends / gain**2
-    return variances
+    return np.asarray((1 - r**2) / gain - ends / gain**2)

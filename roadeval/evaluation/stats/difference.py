@@ -212,8 +212,7 @@ def at_moments(cameras: Sequence[tuple[Sums, Floats]]) -> Floats:
 def group_means(drives: pd.DataFrame) -> Floats:
     """Return the mean of each group's drives, ``(g,)``, for any order of the drives."""
     ordered = drives[drives["mean"].notna()].sort_values(["group", "drive"])
-    means: Floats = ordered.groupby("group")["mean"].mean().to_numpy(float)
-    return means
+    return ordered.groupby("group")["mean"].mean().to_numpy(float)
 
 
 def over_drives(drives: pd.DataFrame, confidence: float, rate: str = TESTED) -> Difference:

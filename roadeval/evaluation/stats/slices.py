@@ -249,7 +249,7 @@ class _Search:
             for score, part, places in sorted(candidates, key=lambda c: -c[0])[:TRIED]:
                 if score <= 0 or len(taken) == TESTED_SLICES:
                     break
-                flags: Flags = np.logical_and.reduce(meets[[*places]])
+                flags = np.logical_and.reduce(meets[[*places]])
                 if any(
                     part == other and (flags & others).sum() > OVERLAP * (flags | others).sum()
                     for others, other in taken
@@ -345,8 +345,7 @@ def _within_drives(wrong: Floats, rest: Floats, labelled: Floats, rest_labelled:
 def _ratios(sides: Floats) -> Floats:
     """Return ERR inside divided by ERR outside."""
     wrong, rest, labelled, rest_labelled = sides.sum(axis=-1)
-    ratios: Floats = wrong / labelled / (rest / rest_labelled)
-    return ratios
+    return np.asarray(wrong / labelled / (rest / rest_labelled))
 
 
 def _contributions(sides: Floats) -> tuple[Floats, Floats, Floats]:

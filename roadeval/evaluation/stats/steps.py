@@ -59,15 +59,14 @@ def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
         end, noise = _alarm(level, width, _noises(jumps, odds)[runs], odds * 8 / 3)
         if not end:
             break
-        place, drifts = _change(level[: end + 1], noise)
+        rise = level[end] - level[0]
+        goes_on = any(last.after == runs[0] and last.change * rise > 0 for last in steps[-1:])
+        place, drifts = _change(level[: end + 1], noise, -2 if goes_on else 2)
         seen, start = int(runs[end]), end if drifts else place
         change = float(np.median(level[start : end + 1]) - np.median(level[:place]))
         rest = level[end + 1 : end + 2] - level[end]
         back = place == end and bool((np.abs(rest + change) < np.abs(rest)).any())
-        goes_on = (
-            steps and not back and steps[-1].after == runs[0] and steps[-1].change * change > 0
-        )
-        if goes_on and (place == 1 or (drifts and 3 * place <= end)):
+        if goes_on and not back and (place == 1 or (drifts and 2 * place <= end)):
             steps[-1] = steps[-1]._replace(kind="drift", after=int(runs[start]))
         else:
             kind = "outlier" if back else "drift" if drifts else "step"
@@ -109,16 +108,17 @@ def _levels(values: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 
 def _noises(jumps: Floats, odds: float) -> Floats:
-    """Return the median of the n jumps before a run, as a noise, wider if n is small."""
+    """Return a run's noise: the median jump before it, or of the last 20; wide after a few."""
     past, known = jumps[~np.isnan(jumps)], np.append(0, np.cumsum(~np.isnan(jumps)))
-    medians = [np.sort(past[:n])[(n - 1) // 2] / 0.6745 for n in range(1, len(past) + 1)]
-    wider = np.exp(odds / np.arange(1, len(past) + 1))
-    return np.append(math.inf if odds else 0.0, medians * wider)[known]
+    number = np.arange(1, len(past) + 1)
+    parts = [(np.sort(past[:n]), np.sort(past[max(n - 20, 0) : n])) for n in number.tolist()]
+    medians = [max(part[(len(part) - 1) // 2] for part in pair) / 0.6745 for pair in parts]
+    return np.append(math.inf if odds else 0.0, medians * np.exp(odds / number))[known]
 
 
 def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[int, Floats]:
     """Return the first run at which two levels fit better by the limit, 0 if none; and noises."""
-    noises = 1.1 ** np.ceil(np.log(np.maximum(noises, LEAST_NOISE)) / math.log(1.1))  # Few fits.
+    noises = 1.1 ** np.ceil(np.log(np.maximum(noises, 1e-9)) / math.log(1.1))  # Few fits.
     first, spread = len(level), width
     for noise in dict.fromkeys(noises[np.isfinite(noises)].tolist()):
         looks = np.flatnonzero(noises[:first] == noise)
@@ -142,11 +142,10 @@ def _fit(level: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
     return losses, least, np.append(0, least[1:] + gains.max(axis=1))
 
 
-def _change(level: Floats, noise: Floats) -> tuple[int, bool]:
-    """Return the place at which the level changes, and whether it drifts from there on.
+def _change(level: Floats, noise: Floats, margin: float) -> tuple[int, bool]:
+    """Return the place at which the level changes, and whether a rise fits better from there on.
 
-    Two levels and a rise, over the last 3 runs or more, have three parameters each. Least squares
-    fit the rise; runs that are far from both levels have less weight.
+    Least squares fit the rise of 3 or more runs; runs far from both levels have less weight.
     """
     losses, least, gains = _fit(level, noise)
     place = int((losses[:-1] - least[:-1, None] - losses[-1]).max(axis=1).argmax()) + 1
@@ -157,5 +156,5 @@ def _change(level: Floats, noise: Floats) -> tuple[int, bool]:
     slope = (rises * weight) @ level / (rises**2 @ weight)
     off = level - weight @ level / weight.sum() - slope[:, None] * rises
     lost = 4 * np.log1p((off / noise) ** 2 / 3).sum(axis=1)
-    drifts = bool(lost.min(initial=math.inf) + 2 < least[-1] - gains[-1])
+    drifts = bool(lost.min(initial=math.inf) + margin < least[-1] - gains[-1])
     return (int(lost.argmin()) + 1 if drifts else place), drifts

@@ -15,12 +15,7 @@ from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, ROAD, colours
 from roadeval.data.arrays import Image, Plane
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.score.label_errors import (
-    BLOCK,
-    LabelledView,
-    find_suspects,
-    rank_suspects,
-)
+from roadeval.evaluation.score.label_errors import BLOCK, LabelledView, find_suspects, rank_suspects
 from roadeval.evaluation.tables import concatenate
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore

@@ -13,13 +13,13 @@ import numpy as np
 from roadeval.data import Rgb, as_plain
 from roadeval.data.words import percent
 from roadeval.errors import RoadevalError
-from roadeval.fleet.remote import local_path, open_source
+from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.frames import FramePicker, facts_of
 from roadeval.jobs.results.inspect import rank_frames
 from roadeval.jobs.results.pick import find_recordings
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.logs.log import open_log
 from roadeval.logs.writing.writer import VIDEO_SUFFIXES
 from roadeval.report.film import clip_picture, encode

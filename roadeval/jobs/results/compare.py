@@ -16,9 +16,8 @@ from roadeval.evaluation.comparison.conditions import Condition, Judgement, judg
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
-from roadeval.fleet.remote import local_path
 from roadeval.jobs.results.history import last_good
-from roadeval.jobs.results.result import DriveResult, Result
+from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.comment import badge

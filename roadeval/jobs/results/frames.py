@@ -7,16 +7,7 @@ from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import (
-    BASELINE,
-    ERRORS,
-    FILTERED,
-    IGNORE,
-    TRUTH,
-    UNFILTERED,
-    Health,
-    LayerKind,
-)
+from roadeval.data import BASELINE, ERRORS, FILTERED, IGNORE, TRUTH, UNFILTERED, Health, LayerKind
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.frame import judge

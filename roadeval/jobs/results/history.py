@@ -32,9 +32,8 @@ from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
 from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
-from roadeval.fleet.remote import local_path
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.results.result import Result
+from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
 from roadeval.report.writing import write_document
 from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
@@ -42,6 +41,7 @@ from roadeval.results.history import Event, History, RunFacts, as_dict, group_ch
 from roadeval.results.schema import TAG
 from roadeval.results.tables import read_parquet, read_table
 from roadeval.runtime.files import Paths, list_paths
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,7 +140,7 @@ def find_results(path: Path) -> list[Path]:
 
     Recordings count only if there is no folder of results. A `RoadevalError` if there is none.
     """
-    if path.is_file() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
+    if not path.is_dir() or (path / SUMMARY).is_file() or (path / FLEET).is_file():
         return [path]
     folders, recordings = [], []
     for folder, below, files in os.walk(path):
@@ -194,10 +194,10 @@ def _runs_in_order(
 def _origin(result: Result, path: Path) -> Origin:
     """Return how a result was made; its time is that of its file if it does not say."""
     origin = result.facts.origin or Origin()
-    if origin.made_ns is not None:
-        return origin
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
-    return replace(origin, made_ns=file.stat().st_mtime_ns)
+    made_ns = origin.made_ns or file.stat().st_mtime_ns
+    labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+    return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
 
 
 def _read_rows(

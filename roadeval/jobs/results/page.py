@@ -18,17 +18,9 @@ from roadeval.evaluation.tables import finals, only, values_of
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.frames import FramePicker, evenly, facts_of
 from roadeval.jobs.results.result import DriveResult
+from roadeval.report import film
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.standard import over_frames, ribbons
-from roadeval.report.film import (
-    CAMERA,
-    MASK,
-    PROBABILITY,
-    TRUTH_PANEL,
-    Film,
-    make_film,
-    shade_truth,
-)
 from roadeval.report.sections.frames import FrameBrowser, ThresholdSlider
 from roadeval.results.verdict import verdicts
 
@@ -102,7 +94,7 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
             yield ThresholdSlider(variant, stage, now, line, counts, by_level, reached=not is_own)
 
 
-def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> Film | None:
+def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> film.Film | None:
     """Return the video of a drive, of at most ``room`` bytes; None without pictures or room.
 
     A long drive is thinned evenly; frames with pictures of all layers are kept if there is room.
@@ -119,27 +111,27 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
     }
     probable = [name for name in result.facts.curves if PROBABILITY_LAYER in layers.get(name, ())]
     panels = [
-        *(CAMERA, *[TRUTH_PANEL] * bool(scored)),
-        *map(MASK.format, finals_of),
-        *map(PROBABILITY.format, probable),
+        *(film.CAMERA, *[film.TRUTH_PANEL] * bool(scored)),
+        *map(film.MASK.format, finals_of),
+        *map(film.PROBABILITY.format, probable),
     ]
 
     def read(frame: int) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
         on_progress(Progress(bisect_right(chosen, frame), len(chosen), "filming"))
-        yield CAMERA, recording.image(frame)
+        yield film.CAMERA, recording.image(frame)
         if frame in scored:
-            yield TRUTH_PANEL, shade_truth(recording.truth(frame))
+            yield film.TRUTH_PANEL, film.shade_truth(recording.truth(frame))
         for name, stage in finals_of.items():
             if (mask := result.layer(name, stage, frame)) is not None:
-                yield MASK.format(name), mask * np.uint8(255)
+                yield film.MASK.format(name), mask * np.uint8(255)
         for name in probable:
             if (probability := result.layer(name, PROBABILITY_LAYER, frame)) is not None:
-                yield PROBABILITY.format(name), (probability * 255).astype(np.uint8)
+                yield film.PROBABILITY.format(name), (probability * 255).astype(np.uint8)
 
     while True:
-        film = make_film(chosen, panels, lambda frame: dict(read(frame)), room)
-        if len(film.content) <= room or len(chosen) < 2:
-            return film
+        made = film.make_film(chosen, panels, lambda frame: dict(read(frame)), room)
+        if len(made.content) <= room or len(chosen) < 2:
+            return made
         chosen = chosen[::2]
 
 

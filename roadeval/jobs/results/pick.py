@@ -104,15 +104,17 @@ def pick(
         names = [drive.name for _, drive, _ in drives]
         if len({*names}) < len(names):
             raise RoadevalError("two drives have the same name; pick from each into its own folder")
-        how = labels, variant, seed
         lengths = [drive.table("unlabelled")["frame"].nunique() for _, drive, _ in drives]
-        return [
-            _pick_frames(
-                drive, _Request(path, share, Path(folder, *[drive.name] * many), *how, run)
-            )
-            for (path, drive, run), share in zip(drives, _share_out(lengths, count), strict=True)
-            if share
-        ]
+        picked = []
+        for (path, drive, run), share in zip(drives, _share_out(lengths, count), strict=True):
+            if share:
+                target = Path(folder, *[drive.name] * many)
+                picks, new = _pick_frames(drive, path, share, target, variant=variant, seed=seed)
+                _write_picks(drive, picks, new, target, labels=labels, run=run)
+                log = drive.facts.log.path if drive.facts.log else drive.name
+                repeats = target / RUN if run else drive.path
+                picked.append(PickedFrames(target, picks, len(new), log, repeats))
+        return picked
 
 
 def open_drives(
@@ -165,36 +167,29 @@ def _share_out(sizes: Sequence[int], count: int) -> list[int]:
     exact = np.array(sizes) * count / max(sum(sizes), 1)
     shares = np.floor(exact).astype(int)
     shares[np.argsort(shares - exact, kind="stable")[: count - shares.sum()]] += 1
-    frames: list[int] = shares.tolist()
-    return frames
+    return shares.tolist()
 
 
-@dataclass(frozen=True)
-class _Request:
-    """The options of `pick` for one drive: its share of the frames, and its folder."""
-
-    source: Path
-    """The log or the recording that was named."""
-    count: int
-    folder: Path
-    labels: str
-    variant: str | None
-    seed: int
-    run: str | None
-    """The configuration as TOML, of a log that was replayed here; None of a recording."""
+NewPicks = list[tuple[Picked, npt.NDArray[np.bool_]]]
+"""Frames that were picked now, each with its mask to correct."""
 
 
-def _pick_frames(drive: DriveResult, request: _Request) -> PickedFrames:
-    """Pick frames of a recording and write them."""
+def _pick_frames(
+    drive: DriveResult, source: Path, count: int, folder: Path, *, variant: str | None, seed: int
+) -> tuple[Picks, NewPicks]:
+    """Pick frames of a recording for a folder; return all picks, and the new ones.
+
+    ``source`` is the log or the recording that was named.
+    """
     rows = drive.table("unlabelled")
     names = values_of(rows, "variant")
     if not names:
-        raise RoadevalError(f"{request.source}: every frame has truth, or none was replayed")
-    if (name := request.variant or names[0]) not in names:
+        raise RoadevalError(f"{source}: every frame has truth, or none was replayed")
+    if (name := variant or names[0]) not in names:
         choice = f"{likely(name, names)}there are {', '.join(names)}"
-        raise RoadevalError(f"no variant {name}", where=request.source, remedy=choice)
+        raise RoadevalError(f"no variant {name}", where=source, remedy=choice)
     doubts = only(rows, variant=name)
-    picks_before = _read_picks(drive, doubts, name, request)
+    picks_before = _read_picks(drive, folder) or _empty_picks(drive, doubts, name, source, seed)
     scores = picks_before.every_score()
     if (sign := sign_of(doubts)) is not None:  # how much they are in doubt by now
         now = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
@@ -202,13 +197,13 @@ def _pick_frames(drive: DriveResult, request: _Request) -> PickedFrames:
     taken = [picks_before.places[stamp] for stamp in picks_before.by_stamp]
     stamps = np.array(picks_before.stamps, np.int64)
     places = choose_frames(
-        stamps, scores, request.count, picks_before.seed, drawn=picks_before.drawn, taken=taken
+        stamps, scores, count, picks_before.seed, drawn=picks_before.drawn, taken=taken
     )
     random, ranked = (numbers.tolist() for numbers in places)
     frames = [picks_before.frames[place] for place in {*random, *ranked} - {*taken}]
     if lacking := sorted({*frames} - {*drive.pictured}):
         raise RoadevalError(
-            f"{request.source}: no pictures of frame {lacking[0]}; replay with --record masks"
+            f"{source}: no pictures of frame {lacking[0]}; replay with --record masks"
         )
     (stage, *_), masks = doubts["stage"], {}
     for frame in frames:
@@ -217,16 +212,12 @@ def _pick_frames(drive: DriveResult, request: _Request) -> PickedFrames:
         masks[frame] = mask == 1
     digests = {frame: digest_of(mask) for frame, mask in masks.items()}
     picks, new = _add_picks(picks_before, random, ranked, digests)
-    _write_picks(drive, picks, [(frame, masks[frame.frame]) for frame in new], request)
-    log = drive.facts.log
-    repeats = request.folder / RUN if request.run else drive.path
-    return PickedFrames(request.folder, picks, len(new), log.path if log else drive.name, repeats)
+    return picks, [(frame, masks[frame.frame]) for frame in new]
 
 
-def _read_picks(drive: DriveResult, doubts: pd.DataFrame, variant: str, request: _Request) -> Picks:
-    """Return the picks that a folder holds, or ones without a frame."""
-    folder, facts = request.folder, drive.facts
-    picks = Picks.read(folder)
+def _read_picks(drive: DriveResult, folder: Path) -> Picks | None:
+    """Return the picks that a folder holds; None if there are none yet."""
+    facts, picks = drive.facts, Picks.read(folder)
     if picks is None:
         # Files that a killed run has left are written again.
         left = {*folder.rglob("*")} if folder.exists() else set()
@@ -236,20 +227,20 @@ def _read_picks(drive: DriveResult, doubts: pd.DataFrame, variant: str, request:
         labels = {file for file in left if folder / LABELS in file.parents}
         if labels or left - begun - proposed:
             raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
-        return _empty_picks(drive, doubts, variant, request)
+        return None
     if (picks.log, picks.camera) != (facts.log_digest, facts.drive.camera):
         raise RoadevalError(f"{folder}: its frames are of another log; name a folder of its own")
     return picks
 
 
 def _write_picks(
-    drive: DriveResult,
-    picks: Picks,
-    new: Sequence[tuple[Picked, npt.NDArray[np.bool_]]],
-    request: _Request,
+    drive: DriveResult, picks: Picks, new: NewPicks, folder: Path, *, labels: str, run: str | None
 ) -> None:
-    """Write images, masks to correct, and last what was picked."""
-    recording, folder = drive.recording, request.folder
+    """Write images, masks to correct, and last what was picked.
+
+    ``run`` is the configuration as TOML, of a log that was replayed here; None of a recording.
+    """
+    recording = drive.recording
     assert recording is not None
     with writing(folder, RoadevalError):
         for part in (IMAGES, PROPOSALS, LABELS):
@@ -259,12 +250,12 @@ def _write_picks(
             name = f"{frame.stamp_ns:019d}.png"
             (folder / IMAGES / name).write_bytes(png_of(recording.image(frame.frame)))
             proposals.append(Proposal(name, mask))
-        for name, content in proposal_files(proposals, request.labels).items():
+        for name, content in proposal_files(proposals, labels).items():
             path = folder / PROPOSALS / name
             wave = new[0][0].wave if path.exists() else ""
             path.with_name(f"{wave}{name}").write_bytes(content)
-        if request.run:
-            put(folder / RUN, request.run.encode())
+        if run:
+            put(folder / RUN, run.encode())
         put(folder / PICK, picks.text().encode())
 
 
@@ -275,13 +266,13 @@ def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, byte
     return {proposal.image: png_of(proposal.levels) for proposal in proposals}
 
 
-def _empty_picks(drive: DriveResult, rows: pd.DataFrame, variant: str, request: _Request) -> Picks:
+def _empty_picks(
+    drive: DriveResult, rows: pd.DataFrame, variant: str, source: Path, seed: int
+) -> Picks:
     """Return picks without a frame: those of a result that can be picked, and their doubt."""
     stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
     if len({*stamps}) < len(stamps):
-        raise RoadevalError(
-            f"{request.source}: several frames have one stamp, so no label finds its own"
-        )
+        raise RoadevalError(f"{source}: several frames have one stamp, so no label finds its own")
     doubts = rows[sign].tolist() if sign else [np.nan] * len(rows)
     method = {"variant": variant, "ranked_by": sign, "identity": drive.properties.get("input")}
     return Picks(
@@ -289,7 +280,7 @@ def _empty_picks(drive: DriveResult, rows: pd.DataFrame, variant: str, request: 
         camera=drive.facts.drive.camera,
         log=drive.facts.log_digest,
         method=method,
-        seed=request.seed,
+        seed=seed,
         drawn=0,
         frames=rows["frame"].tolist(),
         stamps=stamps,

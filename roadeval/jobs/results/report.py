@@ -11,7 +11,6 @@ from typing import Final, Literal
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
-from roadeval.fleet.remote import FETCHED
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import FramePicker, evenly
@@ -22,7 +21,7 @@ from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings
 from roadeval.report.page.render import page, write_page
 from roadeval.report.pdf.typeset import typeset, write_file
-from roadeval.results.facts import Facts
+from roadeval.results.facts import FETCHED, Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import leads_outside, writing
 

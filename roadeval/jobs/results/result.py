@@ -20,9 +20,9 @@ from roadeval.evaluation.comparison.pairing import ComparedDrive
 from roadeval.evaluation.score.scoreboard import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, values_of
-from roadeval.fleet.remote import FETCHED, local_path
 from roadeval.recording.layout import DamagedError, RecordingError, SeveralCamerasError
 from roadeval.results.facts import (
+    FETCHED,
     SUMMARY,
     DriveFacts,
     Facts,
@@ -66,6 +66,15 @@ def _if_there(read: Callable[..., Cells], *address: Any) -> Cells | None:
         raise
     except RecordingError:
         return None
+
+
+def local_path(result: str | Path) -> Path:
+    """Return the path of a result; one behind a URL is fetched."""
+    if "://" not in str(result):
+        return Path(result)
+    from roadeval.fleet.remote import fetch_result
+
+    return fetch_result(str(result))
 
 
 class DriveResult:
@@ -268,8 +277,7 @@ class DriveResult:
     def _both(self) -> list[int]:
         """The frames in both tables, of frames and of regions."""
         frames, regions = (self._tables.table(name)["frame"] for name in ("frames", "regions"))
-        both: list[int] = np.intersect1d(frames, regions).tolist()
-        return both
+        return np.intersect1d(frames, regions).tolist()
 
 
 Opened = DriveResult | FleetFolder

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -244,6 +245,7 @@ DRAWN: Final = 40
 """Most drives with a row; of more drives the worst and the best have one."""
 Interval = tuple[float | None, float | None, float | None]
 """A mean and the ends of its interval, as fractions."""
+ends_of: Final = attrgetter("mean", "low", "high")
 
 
 def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference) -> Chart:
@@ -259,7 +261,7 @@ def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference
         unit="points",
         level=Level(
             "mean" if mean.low is None else "mean and its interval",
-            *map(in_percent, (mean.mean, mean.low, mean.high)),
+            *map(in_percent, ends_of(mean)),
         ),
     )
 
@@ -273,10 +275,7 @@ def changes(finals: Sequence[MaskChange]) -> list[Chart]:
             [
                 _intervals(
                     *("change and its interval", Look(FAINT), range(len(finals))),
-                    [
-                        (change.mean, change.low, change.high)
-                        for change in (row.difference[rate] for row in finals)
-                    ],
+                    [ends_of(row.difference[rate]) for row in finals],
                 )
             ],
             names=[row.name for row in finals],
@@ -310,8 +309,7 @@ def forest(drives: pd.DataFrame, over: Difference, label: str) -> Figure:
             ("better", Look(BETTER), ~is_worse),
         )
     ]
-    mean = [(over.mean, over.low, over.high)]
-    shown.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], mean))
+    shown.append(_intervals(MEAN, Look(FAINT, mark="diamond"), [len(ranked)], [ends_of(over)]))
     chart = Chart(label, ChartKind.MARKS, shown, [*names, MEAN], "points", sums=1)
     if (groups != "").any():
         sentences.append(caption("drives in groups"))
@@ -377,11 +375,8 @@ def precision_over_recall(levels: pd.DataFrame, totals: Totals) -> Chart:
         point = in_percent(total["pooled_TPR"]), in_percent(total.get("pooled_precision"))
         if all(map(math.isfinite, point)):
             masks[name] = point
-    marks = [
-        series(f"{name}: the mask", by_variant[name], [x], [y]) for name, (x, y) in masks.items()
-    ]
+            curves.append(series(f"{name}: the mask", by_variant[name], *([at] for at in point)))
     least = [min([LEAST_AXIS, *values]) for values in zip(*masks.values(), strict=True)]
     across, up = ((start // STEP * STEP, MOST) for start in least or [LEAST_AXIS] * 2)
-    lines = [*curves, *marks]
     title, kind = "precision", ChartKind.LINES
-    return Chart(title, kind, lines, across="recall", x_range=across, y_range=up)
+    return Chart(title, kind, curves, across="recall", x_range=across, y_range=up)

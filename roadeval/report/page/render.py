@@ -19,20 +19,10 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from roadeval.data.words import MINUS
-from roadeval.report.blocks import (
-    Block,
-    Cell,
-    Heading,
-    ImageFile,
-    KeepTogether,
-    Report,
-    Table,
-    plain,
-)
+from roadeval.report.blocks import Block, Cell, Heading, ImageFile, KeepTogether, Report, Table
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import place_chart, range_of_frames, values
-from roadeval.report.film import Film
 from roadeval.report.pdf.typeset import ReportError
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.runtime.files import put, writing
@@ -44,7 +34,12 @@ _SCRIPTS: Final = (
 )
 _SETTING: Final = re.compile(r"`([a-z_]+\.[a-z_.]+|[a-z_]+ = [^`]+)`")
 """A setting, or a line of a configuration, between backticks."""
-_MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
+_MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg", "webm": "video/webm"}
+POLICY: Final = (
+    "default-src 'none'; img-src data:; media-src data:; style-src {}; script-src {}; "
+    "base-uri 'none'; form-action 'none'"
+)
+"""The content security policy: it allows only the page's own parts."""
 
 
 def page(document: Report) -> bytes:
@@ -59,7 +54,7 @@ def page(document: Report) -> bytes:
         .render(
             doc=document,
             sections=sections(document.blocks),
-            policy=_policy(),
+            policy=POLICY.format(_hash(style()), _hash(script())),
             style=style(),
             script=script(),
             place_chart=lambda chart: place_chart(chart, frames),
@@ -67,7 +62,6 @@ def page(document: Report) -> bytes:
             caption=caption,
             values=values,
             source=_source,
-            film_source=_film_source,
             rows_of=_rows,
             variants=variants,
             variant_of=partial(_variant_of, variants),
@@ -75,14 +69,6 @@ def page(document: Report) -> bytes:
         )
     )
     return str(html).encode("utf-8")
-
-
-@cache
-def _policy() -> str:
-    """Return the content security policy: it allows only the page's own parts."""
-    parts = "default-src 'none'; img-src data:; media-src data:; style-src {}; script-src {}"
-    own_parts = parts.format(_hash(style()), _hash(script()))
-    return f"{own_parts}; base-uri 'none'; form-action 'none'"
 
 
 @cache
@@ -109,7 +95,7 @@ def _hash(code: str) -> str:
 
 def _variant_of(variants: Sequence[str], text: Cell | str) -> str:
     """Return the variant that a text begins with, as "a", "a: its mask" or a difference from a."""
-    words = plain(text)
+    words = text if isinstance(text, str) else text.text
     names = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
     return next(names, "")
 
@@ -137,22 +123,11 @@ def _source(image: ImageFile | bytes) -> str:
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
 
 
-def _film_source(film: Film) -> str:
-    return f"data:video/webm;base64,{base64.b64encode(film.content).decode()}"
+def _rows(table: Table) -> Iterator[tuple[list[tuple[Cell | str, bool]], str]]:
+    """Yield a table's rows: cells, with whether each repeats the cell above, and its classes.
 
-
-@dataclass(frozen=True)
-class _Row:
-    """The cells of a row, with whether each repeats the cell above, and the row's classes."""
-
-    cells: Sequence[tuple[Cell | str, bool]]
-    classes: str
-
-
-def _rows(table: Table) -> Iterator[_Row]:
-    """Yield a table's rows; an omitted word is the word of the row above.
-
-    So a row keeps its meaning when the table is sorted.
+    An omitted word is the word of the row above, so a row keeps its meaning when the table is
+    sorted.
     """
     above: dict[int, Cell | str] = {}
     for place, row in enumerate(table.rows):
@@ -163,8 +138,8 @@ def _rows(table: Table) -> Iterator[_Row]:
                 above[column] = cell
             cells.append((above[column] if again else cell, again))
         total = all(isinstance(cell, Cell) and cell.bold for cell in row)
-        rule = place in table.breaks
-        yield _Row(cells, " ".join([*(["rule"] if rule else []), *(["total"] if total else [])]))
+        classes = {"rule": place in table.breaks, "total": total}
+        yield cells, " ".join(name for name, holds in classes.items() if holds)
 
 
 def _unknown(kind: str) -> NoReturn:

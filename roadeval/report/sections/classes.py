@@ -25,7 +25,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     import pandas as pd
 
     rows, focus = findings.table("classes"), findings.facts.focus
-    names = [name for name in findings.finals if name in {*rows["variant"]}]
+    names = [name for name in findings.facts.finals if name in {*rows["variant"]}]
     if focus not in names:
         return
     by_variant = {name: by_class(only(rows, variant=name)) for name in names}

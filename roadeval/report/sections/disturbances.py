@@ -11,7 +11,7 @@ from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart, ChartKind, looks
 from roadeval.report.charts.standard import series
 from roadeval.report.findings import Findings
-from roadeval.report.tables import variant_cell
+from roadeval.report.tables import breaks_of, variant_cell
 from roadeval.results.facts import Facts, FleetFacts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.sentences import correction, marked_interval
@@ -57,28 +57,25 @@ def brief(facts: Facts | FleetFacts) -> Iterator[Block]:
 
 
 def _table(facts: Facts | FleetFacts) -> Table:
-    rows: list[list[Cell | str]] = []
-    breaks, family = [], []
-    for variant, changes in facts.disturbances.items():
-        breaks.append(len(rows))
-        for place, change in enumerate(changes.values()):
-            family.append(change.difference)
-            rows.append(
-                [
-                    "" if place else variant_cell(variant, [*facts.finals]),
-                    change.text,
-                    *map(percent, (change.base_ERR, change.ERR)),
-                    points(change.difference.mean),
-                    marked_interval(change.difference),
-                    number(change.difference.better or 0),
-                    number(change.difference.worse or 0),
-                ]
-            )
+    family = [c.difference for changes in facts.disturbances.values() for c in changes.values()]
+    rows: list[list[Cell | str]] = [
+        [
+            "" if place else variant_cell(variant, [*facts.finals]),
+            change.text,
+            *map(percent, (change.base_ERR, change.ERR)),
+            points(change.difference.mean),
+            marked_interval(change.difference),
+            number(change.difference.better or 0),
+            number(change.difference.worse or 0),
+        ]
+        for variant, changes in facts.disturbances.items()
+        for place, change in enumerate(changes.values())
+    ]
     return Table(
         ["variant", "disturbed by", "from", "to", TESTED, "interval", "better", "worse"],
         rows,
         text_columns=(0, 1),
-        breaks=breaks[1:],
+        breaks=breaks_of(rows),
         groups=[("", 2), ("ERR, %", 2), ("points", 2), (family[0].unit, 2)],
         caption=correction(family),
         small=True,

@@ -64,7 +64,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
     """Yield the effects of the filter and the variants, and how much masks flicker."""
     effects = findings.facts.final_effects
     if effects:
-        filter_too = "the filter and " * (FILTERED in findings.finals)
+        filter_too = "the filter and " * (FILTERED in findings.facts.finals)
         yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
         yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
@@ -76,7 +76,10 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
     elif change:
         steps = only(findings.table("changes"), from_variant=UNFILTERED, to_variant=FILTERED)
         for row in steps[steps["N"] > 0].to_dict("records"):  # a killed run has none
-            yield Text(changed_pixels(row, int(pairs["wrong"].sum())))
+            right, wrong = (percent(row[name] / row["N"]) for name in ("repaired", "spoiled"))
+            net = int(pairs["wrong"].sum())
+            more = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
+            yield Text(caption("changed pixels", right=right, wrong=wrong, change=more))
         legend = caption("filter frame by frame", treated=FILTERED, control=UNFILTERED)
         figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
         yield Details("The filter, frame by frame", [figure])
@@ -95,16 +98,6 @@ def _about_effects(changes: Sequence[Difference]) -> str:
     return " ".join(filter(None, [*sentences, correction(changes)]))
 
 
-def changed_pixels(step: Mapping[Any, Any], net: int) -> str:
-    """Return the shares of pixels that the filter makes right and wrong, and the net change.
-
-    ``step`` is its row of ``changes``, ``net`` the change of wrong pixels, frame by frame.
-    """
-    right, wrong = (percent(step[name] / step["N"]) for name in ("repaired", "spoiled"))
-    change = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
-    return caption("changed pixels", right=right, wrong=wrong, change=change)
-
-
 def _over_time(findings: Findings) -> Iterator[Block]:
     """Tabulate the flicker of each final mask, beside the truth's, and its error episodes."""
     measures = {
@@ -114,22 +107,21 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     }
     if not measures:
         return
-    rows: list[list[Cell | str]] = []
-    for name, measured in measures.items():
-        flicker = measured["flicker"]
-        rows.append(
-            [
-                variant_cell(name, [*findings.finals]),
-                percent(flicker),
-                percent(measured["truth_flicker"]),
-                points(flicker - measured["truth_flicker"]) if defined(flicker) else DASH,
-                *(number(measured[count]) for count in ("pairs", "episodes")),
-                *(f"{measured[time]:.1f}" for time in ("seconds", "longest")),
-                percent(measured["share"]),
-                number(measured["recovered"]),
-                f"{measured['recovery']:.1f}" if measured["recovered"] else DASH,
-            ]
-        )
+    rows: list[list[Cell | str]] = [
+        [
+            variant_cell(name, [*findings.facts.finals]),
+            *(percent(measured[rate]) for rate in ("flicker", "truth_flicker")),
+            points(measured["flicker"] - measured["truth_flicker"])
+            if defined(measured["flicker"])
+            else DASH,
+            *(number(measured[count]) for count in ("pairs", "episodes")),
+            *(f"{measured[time]:.1f}" for time in ("seconds", "longest")),
+            percent(measured["share"]),
+            number(measured["recovered"]),
+            f"{measured['recovery']:.1f}" if measured["recovered"] else DASH,
+        ]
+        for name, measured in measures.items()
+    ]
     table = Table(
         [
             *("final mask", "flicker, %", "the truth's, %", "beyond it", "pairs"),
@@ -152,7 +144,7 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
     # This region counts cells of ground: it has no share of the pixels.
     in_image = findings.regions.index.unique("region").drop(ABOVE, errors="ignore")
     names = titles([*in_image], findings.height)
-    chart = charts.regions(findings.regions, [*findings.finals], names)
+    chart = charts.regions(findings.regions, [*findings.facts.finals], names)
     yield Figure(chart, caption("regions"))
     shadow = caption("detected shadow") if "shadow" in names else ""
     width = findings.facts.evaluation.boundary_width
@@ -171,26 +163,26 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
 def stages(findings: Findings) -> Iterator[Block]:
     """Yield the change of the mask by each stage, and each stage's part of the error."""
     yield Heading("Which stage broke it")
-    yield Figure(charts.stages(findings.totals), caption("stages", baseline=BASELINE))
+    yield Figure(charts.stages(findings.facts.totals), caption("stages", baseline=BASELINE))
     columns = merge_names(findings.error_parts.values())
     yield Table(
         ["final mask", *columns, TESTED],
         [
             [
-                variant_cell(variant, [*findings.totals]),
+                variant_cell(variant, [*findings.facts.totals]),
                 *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
                 percent(findings.total(variant)[TESTED]),
             ]
             for variant, parts in findings.error_parts.items()
         ],
     )
-    both = {FILTERED, UNFILTERED} <= findings.totals.keys()
+    both = {FILTERED, UNFILTERED} <= findings.facts.totals.keys()
     yield note(
         "error parts with the filter" if both else "error parts",
         filtered=FILTERED,
         unfiltered=UNFILTERED,
     )
-    numbers: list[Block] = [stages_table(findings.totals, findings.changes)]
+    numbers: list[Block] = [stages_table(findings.facts.totals, findings.changes)]
     if findings.changes:
         numbers.append(note("repaired and spoiled"))
     yield Details("Every stage in numbers", numbers)
@@ -209,7 +201,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         ],
         [
             [
-                variant_cell(row["variant"], [*findings.totals]),
+                variant_cell(row["variant"], [*findings.facts.totals]),
                 f"perfect {row['oracle']}",
                 percent(row["as_is"]),
                 percent(row[TESTED]),
@@ -228,11 +220,11 @@ def _oracles(findings: Findings) -> Iterator[Block]:
 
 def _perfect_filter(findings: Findings, oracles: Sequence[Mapping[str, Any]]) -> Iterator[Text]:
     """Yield whether a filter that finds all shadow, and nothing else, would help."""
-    if not {FILTERED, UNFILTERED} <= findings.totals.keys():
+    if not {FILTERED, UNFILTERED} <= findings.facts.totals.keys():
         return
     without = findings.total(UNFILTERED)
     for row in oracles:
-        is_filter = row["oracle"] not in findings.totals[FILTERED]
+        is_filter = row["oracle"] not in findings.facts.totals[FILTERED]
         if row["variant"] == FILTERED and is_filter and row["frames"] == without["frames"]:
             helps = row[TESTED] <= without[TESTED]
             yield note(
@@ -268,12 +260,12 @@ def thresholds(findings: Findings) -> Iterator[Block]:
     yield Heading("Over thresholds")
     chart = Figure(
         [
-            charts.precision_over_recall(levels, findings.totals),
-            charts.reliability(levels, findings.totals),
+            charts.precision_over_recall(levels, findings.facts.totals),
+            charts.reliability(levels, findings.facts.totals),
         ],
         caption("curves"),
     )
-    table = thresholds_table(curves, findings.totals)
+    table = thresholds_table(curves, findings.facts.totals)
     blocks = [chart, table, note("meaning of thresholds")]
     yield Details("Precision, recall and MaxF", blocks)
 

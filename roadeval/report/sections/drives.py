@@ -31,7 +31,7 @@ from roadeval.report.blocks import (
 from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart, ChartKind, Series, looks, thin
 from roadeval.report.charts.standard import forest
-from roadeval.results.facts import StratumFacts
+from roadeval.report.tables import breaks_of
 from roadeval.results.fleet import FleetFolder, results_path
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
@@ -117,7 +117,7 @@ def along(findings: FleetFolder, most: int, beside: Path) -> Iterator[Block]:
         return
     rates = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
     frames = finals(only(findings.table("frames"), variant=focus))
-    top, look = 100 * max(frames[TESTED].max(), 0.01), looks([*findings.finals])[focus]
+    top, look = 100 * max(frames[TESTED].max(), 0.01), looks([*findings.facts.finals])[focus]
     yield Heading(f"Along each drive: {focus}")
     yield note("along drives", variant=focus)
     rows = {drive: part for (drive,), part in group_rows(frames, ["drive"])}
@@ -244,34 +244,24 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
     for effect, title in main_effects(findings):
         mask = (effect.base, effect.variant)
         parts = [part for part in findings.facts.strata if (part.base, part.variant) == mask]
-        begins = [place for place, part in enumerate(parts) if part.tag != parts[place - 1].tag]
-        table = Table(
-            ["by", "value", "drives", "mean", "interval", "worse", "better"],
+        rows = [
             [
-                [part.tag if place in (0, *begins) else "", *_part_cells(part)]
-                for place, part in enumerate(parts)
-            ],
-            text_columns=(0, 1),
-            breaks=[place for place in begins if place],
-            small=True,
-        )
+                "" if place and part.tag == parts[place - 1].tag else part.tag,
+                part.value,
+                number(part.difference.units),
+                points(part.difference.mean),
+                marked_interval(part.difference),
+                *(number(n or 0) for n in (part.difference.worse, part.difference.better)),
+            ]
+            for place, part in enumerate(parts)
+        ]
+        titles = ["by", "value", "drives", "mean", "interval", "worse", "better"]
+        table = Table(titles, rows, text_columns=(0, 1), breaks=breaks_of(rows), small=True)
         count = max((part.difference.comparisons or 0 for part in parts), default=0)
         name = "tested strata" if count else "untested strata"
         if parts:
             tested = caption(name, mark=MARK, count=count)
             yield Details(title, [table, note("strata", tested=tested)])
-
-
-def _part_cells(part: StratumFacts) -> list[Cell | str]:
-    """Return a part's cells: its value, drives, mean, interval, and worse and better drives."""
-    change = part.difference
-    return [
-        part.value,
-        number(change.units),
-        points(change.mean),
-        marked_interval(change),
-        *(number(count or 0) for count in (change.worse, change.better)),
-    ]
 
 
 WORST_AT: Final = "#the-worst-frames-over-all-drives"

@@ -82,7 +82,7 @@ def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     sentences = [Text(sentence, "note") for sentence in (stamp, " ".join(facts)) if sentence]
     title = Text(f"Frame {frame.frame}", "title")
     if frame.rates:
-        rates = rates_of(frame, [*findings.finals])
+        rates = rates_of(frame, [*findings.facts.finals])
         yield TwoColumns([title, *sentences], [rates], 0.55)
     else:
         yield from (title, *sentences)

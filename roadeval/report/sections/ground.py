@@ -14,7 +14,7 @@ from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.captions import caption
 from roadeval.report.charts import standard as charts
 from roadeval.report.findings import Findings
-from roadeval.report.tables import variant_cell
+from roadeval.report.tables import breaks_of, variant_cell
 from roadeval.results.facts import Facts
 
 METRES: Final = "metres: "
@@ -32,7 +32,7 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     if findings.facts.kitti:
         yield Heading("KITTI's road benchmark")
         yield kitti_table(findings.facts)
-    rows, names = findings.table("metres").to_dict("records"), [*findings.finals]
+    rows, names = findings.table("metres").to_dict("records"), [*findings.facts.finals]
     if not rows:
         return
     yield Heading("On the ground, in metres")
@@ -60,8 +60,7 @@ def kitti_table(facts: Facts) -> Table:
         for place, (category, row) in enumerate(rows.items())
     ]
     heads = ["variant", "images", "frames", "MaxF", "AP", "PRE", "REC", "FPR", "FNR"]
-    breaks = [place for place, line in enumerate(lines) if place and line[0]]
-    return Table(heads, lines, (0, 1), breaks, caption=caption("kitti"), small=True)
+    return Table(heads, lines, (0, 1), breaks_of(lines), caption=caption("kitti"), small=True)
 
 
 def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool = False) -> Table:
@@ -129,22 +128,22 @@ def edges_tables(rows: Sequence[Measure], names: Sequence[str]) -> Iterator[Tabl
     measures = {(row["variant"], row["measure"], row["where"]): row for row in rows}
     places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == LEFT))
     variants = [name for name in names if name != BASELINE and (name, FREE, "ahead") in measures]
-    posed, breaks = _is_posed(rows), []
+    posed = _is_posed(rows)
     lines: list[list[Cell | str]] = []
     for variant in variants:
-        breaks.append(len(lines))
+        head: Cell | str = variant_cell(variant, names)
         for place in places:
             sides = [measures[variant, side, place] for side in (LEFT, RIGHT)]
             if any(row["frames"] for row in sides):
-                head = variant_cell(variant, names) if len(lines) == breaks[-1] else ""
                 cells = (cell for row in sides for cell in _end(row, posed=posed))
                 lines.append([head, charts.in_metres(place), *cells])
+                head = ""
     columns = ("median", "as it stands", "95 %", "missing")
     if lines:
         yield Table(
             ["edges, m", "ahead", *columns, *columns],
             lines,
-            breaks=breaks[1:],
+            breaks=breaks_of(lines),
             groups=[("", 2), ("left edge of the road", 4), ("right edge", 4)],
             caption=caption("edges"),
             small=True,

@@ -28,7 +28,7 @@ def each_camera(findings: Findings) -> Iterator[Block]:
         size = f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
         yield Text(", ".join(filter(None, (topic, size))), "note")
         yield Text(facts.verdict)
-        if of_camera.totals:
+        if facts.totals:
             yield Details("Rates of every final mask", [rates_table(facts)])
         yield from when_it_fails(of_camera, level=2)
         for frame in of_camera.worst[:1]:

@@ -8,14 +8,7 @@ from typing import Final
 from roadeval.data import BASELINE
 from roadeval.data.words import counted, defined, listing, number, percent
 from roadeval.evaluation.metrics import TESTED
-from roadeval.report.blocks import (
-    Block,
-    BulletList,
-    Heading,
-    ImageGrid,
-    LinkList,
-    Text,
-)
+from roadeval.report.blocks import Block, BulletList, Heading, ImageGrid, LinkList, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
@@ -59,7 +52,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
             title = caption("worst frame", frame=frame.frame, variant=frame.variant, ERR=wrong)
         command = findings.inspect(frame.frame) if findings.inspect else ""
         yield LinkList([(title, f"#frame-{frame.frame}")], command)
-    if findings.totals:
+    if findings.facts.totals:
         yield rates_table(findings.facts)
     facts = findings.facts
     yield Text(account(facts.frames, facts.windows, facts.evaluation.window), "note")
@@ -111,12 +104,12 @@ def warnings(findings: Findings) -> Iterator[str]:
     facts = findings.facts
     yield from facts.warnings
     trained_here = facts.training.model is None or facts.training.adapted
-    if facts.training.source == "truth" and trained_here and findings.totals:
+    if facts.training.source == "truth" and trained_here and findings.facts.totals:
         yield caption("trained on this drive")
-    errors = {name: findings.total(name)[TESTED] for name in findings.finals}
+    errors = {name: findings.total(name)[TESTED] for name in findings.facts.finals}
     if worse := _worse_than_baseline(errors):
         yield caption("worse than blind", worse=worse)
-    for variant in findings.finals:
+    for variant in findings.facts.finals:
         total = findings.total(variant)
         if rates := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
             frames, rates_named = number(total["frames"]), listing(rates)

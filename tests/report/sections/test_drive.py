@@ -180,7 +180,7 @@ def bold(table, title):
 
 def test_an_undefined_rate_is_never_the_best():
     findings = some_findings()
-    findings.totals["filtered"]["post"]["ERR"] = math.nan
+    findings.facts.totals["filtered"]["post"]["ERR"] = math.nan
     assert bold(rates_table(findings.facts), "ERR") == ["12.00"]
 
 
@@ -266,7 +266,7 @@ def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
 def test_a_variant_has_one_mark_in_tables_and_charts():
     findings = some_findings()
     marks = {row[0].text: row[0].look for row in rates_table(findings.facts).rows}
-    for chart in charts.stages(findings.totals):
+    for chart in charts.stages(findings.facts.totals):
         assert {series.name: series.look for series in chart.series} == marks
 
 

@@ -4,21 +4,17 @@ const SVG = "http://www.w3.org/2000/svg";
 const along = []; // The charts along the drive.
 const range = { drive: null, low: 0, high: 0, frames: null, onChange: [] };
 
-function svg(name, attributes) {
+function svg(name, attributes, text = "") {
   const made = document.createElementNS(SVG, name);
+  made.textContent = text;
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
   return made;
 }
 
-/** The position in rising numbers that is nearest to a value. */
+/** The position in numbers that is nearest to a value. */
 function nearest(numbers, value) {
-  let [low, high] = [0, numbers.length - 1];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (numbers[middle] < value) low = middle;
-    else high = middle;
-  }
-  return Math.abs(numbers[low] - value) <= Math.abs(numbers[high] - value) ? low : high;
+  const far = (place) => Math.abs(numbers[place] - value);
+  return numbers.reduce((best, _, place) => (far(place) < far(best) ? place : best), 0);
 }
 
 /** About so many round numbers in a range, at least so far from each other. */
@@ -31,25 +27,15 @@ function roundNumbers(low, high, count, least = 1) {
   return numbers;
 }
 
-/** The first line of the words at the pointer. */
-function tipHead(text) {
-  const head = document.createElement("p");
-  head.className = "head";
-  head.textContent = text;
-  return head;
-}
-
 /** A name with its value, behind a variant's mark. */
 function tipLine(name, value, mark = null) {
-  const line = document.createElement("p");
-  const bold = document.createElement("b");
-  bold.textContent = value;
+  const line = make("p");
   if (mark) {
     const dot = svg("svg", { class: "dot", viewBox: "-6 -6 12 12" });
     dot.append(mark.cloneNode());
     line.append(dot);
   }
-  line.append(name, bold);
+  line.append(name, make("b", { textContent: value }));
   return line;
 }
 
@@ -65,22 +51,16 @@ class ChartView {
   constructor(element, onFrame) {
     this.element = element;
     this.values = JSON.parse(element.dataset.values);
+    this.numbers = [...new Set(this.values.series.flatMap((series) => series.x))].sort((a, b) => a - b);
     this.area = element.querySelector(".area");
     [this.low, this.high] = this.values.x;
     this.cursor = svg("path", { class: "cursor" });
     this.here = svg("path", { class: "here" });
-    this.tip = document.createElement("div");
-    this.tip.className = "tip";
-    this.tip.hidden = true;
     this.area.append(this.here, this.cursor);
-    this.driveButton = document.createElement("button");
-    this.driveButton.type = "button";
-    this.driveButton.className = "whole";
-    this.driveButton.textContent = "Whole drive";
-    this.driveButton.hidden = true;
+    this.driveButton = make("button", { type: "button", className: "whole", textContent: "Whole drive", hidden: true });
     this.driveButton.addEventListener("click", () => zoom(...range.drive));
     element.append(this.driveButton);
-    element.append(this.tip);
+    this.tip = makeTip(element);
     this.area.setAttribute("tabindex", "0");
     this.listen(onFrame);
   }
@@ -119,22 +99,14 @@ class ChartView {
   key(event, onFrame) {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (step && this.values.frames && this.element.classList.contains("low")) return; // The page goes to the next frame.
-    const numbers = this.numbers();
+    const { numbers } = this;
     const place = this.pointed === undefined ? 0 : nearest(numbers, this.pointed);
-    if (step) {
-      const next = Math.min(Math.max(place + step, 0), numbers.length - 1);
-      pointAt(this, numbers[next]);
-    } else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
+    if (step) pointAt(this, numbers[Math.min(Math.max(place + step, 0), numbers.length - 1)]);
+    else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
     else if (event.key === "Escape" && this.values.frames) zoom(...range.drive);
     else return;
     event.preventDefault();
     event.stopPropagation();
-  }
-
-  /** All positions that have a value, in order. */
-  numbers() {
-    this.positions ??= [...new Set(this.values.series.flatMap((series) => series.x))].sort((a, b) => a - b);
-    return this.positions;
   }
 
   /** The place of a position, in percent of the chart. */
@@ -150,8 +122,7 @@ class ChartView {
   }
 
   snapped(x) {
-    const numbers = this.numbers();
-    return numbers.length ? numbers[nearest(numbers, x)] : x;
+    return this.numbers[nearest(this.numbers, x)] ?? x;
   }
 
   point(x) {
@@ -197,7 +168,7 @@ class ChartView {
       return isOmitted ? null : tipLine(series.name, withEnds(value, series.low?.[place], series.high?.[place], unit), this.markOf(series.name));
     });
     if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
-    this.tip.replaceChildren(tipHead(this.where()), ...lines.filter(Boolean));
+    this.tip.replaceChildren(make("p", { className: "head", textContent: this.where() }), ...lines.filter(Boolean));
     this.tip.hidden = false;
     const share = (this.pointed - this.low) / (this.high - this.low);
     const [left, width] = [this.area.getBoundingClientRect().left - this.element.getBoundingClientRect().left, this.area.clientWidth];
@@ -228,9 +199,7 @@ class ChartView {
       ...ticks.map((tick) => {
         const place = (100 * (tick - low)) / (high - low);
         // The last number stays inside.
-        const text = svg("text", { x: `${place}%`, y: 14, ...(place > 97 ? { class: "last" } : {}) });
-        text.textContent = tick;
-        return text;
+        return svg("text", { x: `${place}%`, y: 14, ...(place > 97 ? { class: "last" } : {}) }, tick);
       }),
     );
   }
@@ -250,9 +219,8 @@ class ChartView {
   scale(bottom, top) {
     const [first, last] = this.values.y;
     const texts = roundNumbers(bottom, top, 5, 0).map((tick) => {
-      const text = svg("text", { x: "100%", y: `${(100 * (top - tick)) / (top - bottom)}%` });
-      text.textContent = `${Number(tick.toFixed(6))}`.replace("-", "\u2212");
-      return text;
+      const text = `${Number(tick.toFixed(6))}`.replace("-", "\u2212");
+      return svg("text", { x: "100%", y: `${(100 * (top - tick)) / (top - bottom)}%` }, text);
     });
     if (!this.element.classList.contains("low")) this.element.querySelector(".ys").replaceChildren(...texts);
     return [(100 * (last - top)) / (last - first), (100 * (top - bottom)) / (last - first)];

@@ -9,12 +9,10 @@ class Film {
     this.colours = colours;
     this.places = new Map(facts.frames.map((frame, place) => [frame, place]));
     this.levels = {}; // A variant's threshold in levels of its probability, if it was moved.
-    const canvas = document.createElement("canvas");
-    canvas.width = facts.columns * facts.width;
-    canvas.height = Math.ceil(facts.panels.length / facts.columns) * facts.height;
+    const height = Math.ceil(facts.panels.length / facts.columns) * facts.height;
+    const canvas = make("canvas", { width: facts.columns * facts.width, height });
     this.mosaic = canvas.getContext("2d", { willReadFrequently: true });
-    this.video = document.createElement("video");
-    Object.assign(this.video, { muted: true, preload: "auto", playsInline: true, src: source });
+    this.video = make("video", { muted: true, preload: "auto", playsInline: true, src: source });
     this.video.addEventListener("seeked", () => this.seeked());
     this.video.addEventListener("loadeddata", () => this.seeked());
     this.onFrame = onFrame;

@@ -30,18 +30,13 @@ class Browser {
     this.tools();
     this.filters();
     this.threshold();
-    for (const row of this.rows) {
-      row.addEventListener("click", (event) => {
-        event.preventDefault();
-        this.show(Number(row.dataset.frame));
-      });
-    }
-    for (const link of document.querySelectorAll('a[href^="#frame-"]:not(.frames a)')) {
-      link.addEventListener("click", (event) => {
-        event.preventDefault();
-        this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
-      });
-    }
+    document.addEventListener("click", (event) => {
+      const [row, link] = [".frames tbody tr", 'a[href^="#frame-"]'].map((part) => event.target.closest(part));
+      if (!row && !link) return;
+      event.preventDefault();
+      if (row) this.show(Number(row.dataset.frame));
+      else this.show(Number(link.hash.slice("#frame-".length)), { scroll: true });
+    });
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
     range.frames = this.data.frames;
     range.onChange.push(() => this.narrow());
@@ -66,10 +61,8 @@ class Browser {
 
   tools() {
     const tools = this.element.querySelector(".tools");
-    this.where = tools.querySelector(".where");
-    this.previous = tools.querySelector(".previous");
-    this.next = tools.querySelector(".next");
-    this.playButton = tools.querySelector(".play");
+    const names = [".where", ".previous", ".next", ".play"];
+    [this.where, this.previous, this.next, this.playButton] = names.map((name) => tools.querySelector(name));
     tools.hidden = false;
     this.previous.addEventListener("click", () => this.step(-1));
     this.next.addEventListener("click", () => this.step(1));
@@ -88,7 +81,7 @@ class Browser {
   /** The frames to step through: those of the film, without one those with pictures; within the chosen part. */
   shown() {
     const all = this.film ? this.film.frames : [...this.held.keys()].sort((a, b) => a - b);
-    const inside = all.filter((frame) => isInRange(frame));
+    const inside = all.filter(isInRange);
     return inside.length ? inside : all;
   }
 
@@ -101,15 +94,13 @@ class Browser {
   /** Play from this frame, from the first one if this is the last; or stop. */
   toggle() {
     const [frames, button] = [this.shown(), this.playButton];
-    if (this.film.playing) this.film.pause();
-    else {
-      if (this.frame >= frames.at(-1)) this.show(frames[0]);
-      button.textContent = "Pause";
-      this.film.play(frames.at(-1), () => {
-        button.textContent = "Play";
-        this.show(this.frame, { address: "replaceState" });
-      });
-    }
+    if (this.film.playing) return this.film.pause();
+    if (this.frame >= frames.at(-1)) this.show(frames[0]);
+    button.textContent = "Pause";
+    this.film.play(frames.at(-1), () => {
+      button.textContent = "Play";
+      this.show(this.frame, { address: "replaceState" });
+    });
   }
 
   /** Show a frame; the address names it, as a new step of the history or in place of the last step. */
@@ -154,8 +145,8 @@ class Browser {
     const [table, names] = [this.about.querySelector("table"), Object.keys(this.data.counts)];
     const scored = names.filter((name) => this.countsOf(name, this.frame) && isShown(name));
     const cells = (tag, texts) => {
-      const line = document.createElement("tr");
-      line.append(...texts.map((text, place) => Object.assign(document.createElement(place ? tag : "th"), { textContent: text, scope: place ? "" : tag === "th" ? "col" : "row" })));
+      const line = make("tr");
+      line.append(...texts.map((text, place) => make(place ? tag : "th", { textContent: text, scope: place ? "" : tag === "th" ? "col" : "row" })));
       const dot = this.ratesTable?.querySelector(`tr[data-of="${CSS.escape(texts[0])}"] .dot`);
       if (dot) line.cells[0].prepend(dot.cloneNode(true));
       return line;
@@ -188,8 +179,7 @@ class Browser {
   }
 
   frameButton(frame) {
-    const button = document.createElement("button");
-    [button.type, button.textContent] = ["button", frame];
+    const button = make("button", { type: "button", textContent: frame });
     button.addEventListener("click", () => this.show(frame, { follow: true }));
     return button;
   }
@@ -199,18 +189,26 @@ class Browser {
     this.filter();
     this.judge();
     if (this.frame === undefined) return;
-    const counts = (frame) => this.countsOf(choice.focus, frame);
-    const scored = this.shown().filter(counts);
-    const error = (frame) => RATES.ERR(counts(frame));
-    if (!isInRange(this.frame) && scored.length) this.show(scored.reduce((worst, frame) => (error(frame) > error(worst) ? frame : worst)), { address: null });
+    const worst = this.worstOf(this.shown());
+    if (!isInRange(this.frame) && worst !== undefined) this.show(worst, { address: null });
     this.writeAddress();
+  }
+
+  errorOf(frame) {
+    return RATES.ERR(this.countsOf(choice.focus, frame));
+  }
+
+  /** The frame with the highest error rate of the focus; undefined if none was scored. */
+  worstOf(frames) {
+    const scored = frames.filter((frame) => this.countsOf(choice.focus, frame));
+    return scored.reduce((worst, frame) => (this.errorOf(frame) > this.errorOf(worst) ? frame : worst), scored[0]);
   }
 
   /** Say how wrong the focus is, on the whole drive or on the chosen part of it. */
   judge() {
     const { words, counts, frames, verdicts } = this.data;
     const countsIn = (name) => counts[name].filter((frame, place) => frame && isInRange(frames[place]));
-    const [inside, ofFocus] = [frames.filter((frame) => isInRange(frame)), counts[choice.focus]];
+    const [inside, ofFocus] = [frames.filter(isInRange), counts[choice.focus]];
     const rates = (name) => Object.fromEntries(["ERR", "FNR", "FPR"].map((rate) => [rate, percent(meanRate(rate, countsIn(name)), 1)]));
     this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus]?.replaceAll("`", "") ?? this.verdictOfDrive);
     if (isPart() && ofFocus) {
@@ -220,16 +218,10 @@ class Browser {
       this.verdict.textContent = fill(words["verdict of a range"], { ...named, ...rates(choice.focus) });
     }
     const link = document.querySelector("#summary .links a");
-    const scored = inside.filter((frame) => this.countsOf(choice.focus, frame));
-    if (link && scored.length) {
-      const error = (frame) => RATES.ERR(this.countsOf(choice.focus, frame));
-      const worst = scored.reduce((most, frame) => (error(frame) > error(most) ? frame : most));
-      link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(error(worst), 1) });
+    const worst = this.worstOf(inside);
+    if (link && worst !== undefined) {
+      link.textContent = fill(words["worst frame"], { frame: worst, variant: choice.focus, ERR: percent(this.errorOf(worst), 1) });
       link.hash = `#frame-${worst}`;
-      link.onclick = (event) => {
-        event.preventDefault();
-        this.show(worst, { scroll: true });
-      };
       const command = document.querySelector("#summary .links code");
       if (command) command.textContent = this.element.dataset.command.replace("{}", worst);
     }
@@ -241,14 +233,12 @@ class Browser {
     this.thresholdBox = this.about.querySelector(".threshold");
     if (!this.thresholdBox) return;
     const [input, button] = [this.thresholdBox.querySelector("input"), this.thresholdBox.querySelector("button")];
-    input.addEventListener("input", () => {
-      this.setLevel(Number(input.value));
+    const set = (level) => {
+      this.setLevel(level);
       this.writeAddress();
-    });
-    button.addEventListener("click", () => {
-      this.setLevel(undefined);
-      this.writeAddress();
-    });
+    };
+    input.addEventListener("input", () => set(Number(input.value)));
+    button.addEventListener("click", () => set(undefined));
   }
 
   setLevel(level) {
@@ -257,8 +247,7 @@ class Browser {
     this.thresholdBox.hidden = !slider;
     if (!slider) return;
     if (this.film) {
-      if (level === undefined) delete this.film.levels[choice.focus];
-      else this.film.levels[choice.focus] = level;
+      this.film.levels[choice.focus] = level;
       this.stage.draw();
     }
     // A level holds 256 of the 65536 codes of a probability; road are the pixels above a code.
@@ -286,12 +275,8 @@ class Browser {
     form.hidden = false;
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("input", () => this.filter());
-    form.addEventListener("reset", () => {
-      setTimeout(() => {
-        if (range.drive) zoom(...range.drive);
-        else this.filter();
-      });
-    });
+    const clear = () => (range.drive ? zoom(...range.drive) : this.filter());
+    form.addEventListener("reset", () => setTimeout(clear));
   }
 
   filter() {

@@ -5,12 +5,8 @@ let onClosed = null;
 
 /** Show something over the page until it is closed. */
 function enlarge(content, closed = null) {
-  const inside = document.createElement("div");
-  inside.className = "inside";
-  const button = document.createElement("button");
-  button.type = "button";
-  button.className = "closing";
-  button.textContent = "Close";
+  const inside = make("div", { className: "inside" });
+  const button = make("button", { type: "button", className: "closing", textContent: "Close" });
   button.addEventListener("click", () => dialog.close());
   inside.append(button, ...content);
   dialog.replaceChildren(inside);
@@ -26,13 +22,8 @@ dialog.addEventListener("click", (event) => {
   if (event.target === dialog) dialog.close();
 });
 
-function enlargePicture(image) {
-  const large = document.createElement("img");
-  [large.src, large.alt] = [image.src, image.alt];
-  const words = document.createElement("p");
-  words.className = "note";
-  words.textContent = image.alt;
-  enlarge([large, words]);
+function enlargePicture({ src, alt }) {
+  enlarge([make("img", { src, alt }), make("p", { className: "note", textContent: alt })]);
 }
 
 /** Two pictures of the film over each other: one to the left of the slider, one to the right. */
@@ -42,10 +33,8 @@ class Stage {
     this.film = film;
     this.home = element.parentElement;
     this.next = element.nextElementSibling;
-    this.above = element.querySelector(".above");
-    this.below = element.querySelector(".below");
-    this.edge = element.querySelector(".edge");
-    this.slider = element.querySelector("input");
+    const parts = [".above", ".below", ".edge", "input"].map((name) => element.querySelector(name));
+    [this.above, this.below, this.edge, this.slider] = parts;
     this.selects = [element.querySelector(".left"), element.querySelector(".right")];
     this.slider.addEventListener("input", () => this.slide());
     for (const select of this.selects) {

@@ -1,9 +1,7 @@
 // Values in rows of marks, under the pointer and by the arrow keys.
 
 function makeTip(element) {
-  const tip = document.createElement("div");
-  tip.className = "tip";
-  tip.hidden = true;
+  const tip = make("div", { className: "tip", hidden: true });
   element.append(tip);
   return tip;
 }
@@ -42,7 +40,7 @@ class RowsView {
   }
 
   point(number) {
-    if (this.pointed !== null && this.pointed !== undefined) this.rows[this.pointed].classList.remove("pointed");
+    this.rows[this.pointed]?.classList.remove("pointed");
     this.pointed = number;
     this.tip.hidden = number === null || !this.rows[number].marks.length;
     if (number === null) return;
@@ -52,7 +50,7 @@ class RowsView {
       const [, name, value] = /^(.*?): ([^:]*)$/s.exec(text) ?? [null, text, ""];
       return tipLine(name, value, mark);
     });
-    this.tip.replaceChildren(tipHead(row.querySelector(".name").textContent), ...lines);
+    this.tip.replaceChildren(make("p", { className: "head", textContent: row.querySelector(".name").textContent }), ...lines);
     const below = row.offsetTop + row.offsetHeight;
     place(this.tip, this.element, this.element.clientWidth * 0.5, below);
   }

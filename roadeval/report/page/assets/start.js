@@ -4,9 +4,7 @@
 function makeCommands() {
   if (!navigator.clipboard) return;
   for (const command of document.querySelectorAll(".command")) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = "Copy";
+    const button = make("button", { type: "button", textContent: "Copy" });
     button.addEventListener("click", async () => {
       await navigator.clipboard.writeText(command.querySelector("code").textContent);
       button.textContent = "Copied";
@@ -55,7 +53,7 @@ followOutline();
 /** The frame of the table that is nearest to a number. */
 function nearestFrame(frame) {
   const frames = browser.shown();
-  return frames.length ? frames[nearest(frames, frame)] : frame;
+  return frames[nearest(frames, frame)] ?? frame;
 }
 
 for (const image of document.querySelectorAll(".grid img")) {

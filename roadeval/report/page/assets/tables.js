@@ -1,5 +1,8 @@
 // Tables that sort by a click on a column's title, and fields that search long tables.
 
+/** A new element with its properties. */
+const make = (tag, properties) => Object.assign(document.createElement(tag), properties);
+
 const MOST_ROWS = 3; // Fewer rows need no sorting.
 
 /** The number at the beginning of a cell's text, as people write it; NaN without one. */
@@ -35,8 +38,7 @@ function makeSortable(table) {
   const titles = [...table.tHead.rows[table.tHead.rows.length - 1].cells];
   for (const [column, title] of titles.entries()) {
     if (!title.textContent.trim()) continue;
-    const button = document.createElement("button");
-    button.type = "button";
+    const button = make("button", { type: "button" });
     button.append(...title.childNodes);
     title.append(button);
     button.addEventListener("click", () => {
