@@ -258,15 +258,9 @@ def _file(
     shape: tuple[int, int], bits: int, kind: int, chunks: Sequence[bytes], lines: Bytes
 ) -> bytes:
     height, width = shape
-    return b"".join(
-        (
-            _SIGNATURE,
-            _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0)),
-            *chunks,
-            _chunk(b"IDAT", compress(lines)),
-            _chunk(b"IEND", b""),
-        )
-    )
+    head = _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0))
+    pixels = _chunk(b"IDAT", compress(lines))
+    return b"".join((_SIGNATURE, head, *chunks, pixels, _chunk(b"IEND", b"")))
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:

@@ -514,9 +514,8 @@ def after_a_rig(texts: Mapping[str, str]) -> StaticData:
 
 def _rig_guide(drive: str, cameras: Iterable[str], verdict: str = "") -> tuple[str, list[Any]]:
     names = f"**Cameras:** {as_markdown(', '.join(cameras))}"
-    return _guide(
-        drive, verdict, names, "", _ERRORS, "**Tabs:** one for each camera.", "", _HANDLING
-    )
+    tabs = "**Tabs:** one for each camera."
+    return _guide(drive, verdict, names, "", _ERRORS, tabs, "", _HANDLING)
 
 
 def _lines(layout: Layout, camera: str) -> StaticData:

@@ -339,12 +339,9 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
     drawn, passed = _draw_frames(task)
     if not drawn:
         why = f": {min(passed.values())}" if passed else ""
-        return FoldModel(
-            task.fold,
-            "",
-            f"the model of fold {task.fold} could not be trained: none of the "
-            f"{len(task.candidates)} drives of the other folds gives training frames{why}",
-        )
+        others = f"none of the {len(task.candidates)} drives of the other folds"
+        problem = f"could not be trained: {others} gives training frames{why}"
+        return FoldModel(task.fold, "", f"the model of fold {task.fold} {problem}")
     try:
         model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
     except TrainingError as error:

@@ -420,11 +420,8 @@ def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
     others = Sentence(" ").join(Sentence("{only} {}", name) for name in names)
     remedy = Sentence("mend it, or leave the variant out with {}", others) if names else "mend it"
     frames = f"the first {len(failures)} frames ({first.frame} to {last.frame})"
-    return StageError(
-        Sentence("{}, on each of {}", first.reason, frames),
-        where=f"variant {first.variant}",
-        remedy=remedy,
-    )
+    problem = Sentence("{}, on each of {}", first.reason, frames)
+    return StageError(problem, where=f"variant {first.variant}", remedy=remedy)
 
 
 def _process(
