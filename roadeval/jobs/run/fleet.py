@@ -201,16 +201,10 @@ class FleetRun:
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
         drawn = [by_id[drive] for drive in shuffle(by_id, settings.training.seed)]
-        training = [
-            FoldTask(
-                self.folder,
-                fold,
-                tuple((e, configs[e.id]) for e in drawn if folds[e.id] != fold),
-                settings,
-                software(settings),
-            )
-            for fold in range(count)
-        ]
+        training = []
+        for fold in range(count):
+            others = tuple((e, configs[e.id]) for e in drawn if folds[e.id] != fold)
+            training.append(FoldTask(self.folder, fold, others, settings, software(settings)))
         self.show("training")
         futures = [engine.submit(train_fold, task) for task in training]
         made, tasks = [], []
@@ -255,13 +249,11 @@ class FleetRun:
 
     def _reason(self, error: Exception, doing: str) -> str:
         """Return why a task has failed; what ends the whole run is raised."""
-        match error:
-            case RoadevalError():
-                raise error
-            case CancelledError():
-                raise FleetError(
-                    "the workers have gone, or their scheduler", where=self.folder, remedy=GO_ON
-                ) from error
+        if isinstance(error, RoadevalError):
+            raise error
+        if isinstance(error, CancelledError):
+            problem = "the workers have gone, or their scheduler"
+            raise FleetError(problem, where=self.folder, remedy=GO_ON) from error
         if is_worker_death(error):
             return (
                 f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
