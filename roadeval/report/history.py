@@ -136,7 +136,7 @@ def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
 def _details(history: History, event: Event) -> Details:
     """Return what an event changed, what else differs there, and the drives that carry it."""
     first, run = event.first, history.runs[event.run]
-    blocks: list[Block] = [BulletList("What changed there", event.reasons)] if event.reasons else []
+    blocks: list[Block] = [BulletList("What changed there", event.reasons)]
     changes: Rows = [
         [c.line.variant, c.line.title, points(c.difference.mean), marked_interval(c.difference)]
         for c in event.changes
@@ -152,9 +152,7 @@ def _details(history: History, event: Event) -> Details:
     columns = ["drive", "before %", "after %", "change"]
     blocks.append(Table(columns, drives, caption=title, small=True))
     if event.frames:
-        frames: Rows = [
-            [drive, str(frame), points(change)] for drive, frame, change in event.frames
-        ]
+        frames: Rows = [[drive, str(n), points(change)] for drive, n, change in event.frames]
         title = "Frames that changed most"
         blocks.append(Table(["drive", "frame", "change of ERR"], frames, caption=title, small=True))
     paths = [history.runs[place].paths[0] for place in (event.run - 1, event.run)]
@@ -164,18 +162,14 @@ def _details(history: History, event: Event) -> Details:
 
 def _drives_table(history: History) -> Details:
     """Return the error rate of the focus on each drive, run by run."""
+    import pandas as pd
+
     rows: Rows = []
-    lines = (
-        m for m in history.lines if (m.variant, m.kind, m.rate) == (history.focus, ALL, TESTED)
-    )
-    for line in lines:
-        for drive, places in line.drives.reset_index(drop=True).groupby("drive").groups.items():
-            rates = line.drive_rates[:, places]
-            there = ~np.isnan(rates)
-            means = np.where(there, rates, 0).sum(axis=1) / np.where(
-                there.any(1), there.sum(1), np.nan
-            )
-            rows.append([str(drive), *_over_runs(means, means)])
+    for line in history.lines:
+        if (line.variant, line.kind, line.rate) == (history.focus, ALL, TESTED):
+            by_drive = pd.DataFrame(line.drive_rates.T).groupby(line.drives["drive"].to_numpy())
+            for drive, rates in by_drive.mean().iterrows():
+                rows.append([str(drive), *_over_runs(rates.to_numpy(), rates.to_numpy())])
     columns = ["drive", "first %", "last %", "over the runs"]
     table = Table(columns, rows, text_columns=(0, 3), small=True, find="Find drives:")
     return Details(f"{TESTED} of {history.focus} on each drive", [table], on_paper=False)
