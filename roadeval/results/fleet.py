@@ -368,11 +368,7 @@ class FleetWriter:
                 with suppress(ValueError):  # damage: it is written again
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
-            elif (
-                not (self.folder / RESULTS).is_dir()
-                and self.folder.is_dir()
-                and any(self.folder.iterdir())
-            ):
+            elif not (self.folder / RESULTS).is_dir() and any(self.folder.glob("*")):
                 raise ResultsError(
                     f"{self.folder}: holds other files and is no fleet's folder; name a new one"
                 )

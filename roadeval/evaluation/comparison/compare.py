@@ -200,12 +200,9 @@ def variants_as_sides(
             raise ComparisonError(f"no variant {name}", where=result.label, remedy=choice)
     if len(names) < 2:
         lone = f"{names[0]} alone" if names else "no variant"
-        raise ComparisonError(
-            f"{lone} cannot be compared",
-            where=result.label,
-            remedy="name two of its variants with --variant "
-            f"({', '.join(variants) or 'it has none'}), or a second result",
-        )
+        there = ", ".join(variants) or "it has none"
+        remedy = f"name two of its variants with --variant ({there}), or a second result"
+        raise ComparisonError(f"{lone} cannot be compared", where=result.label, remedy=remedy)
     return [replace(result, label=name, variants={name: name}) for name in names]
 
 

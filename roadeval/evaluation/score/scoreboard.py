@@ -389,7 +389,5 @@ class DriveSums:
     @property
     def times(self) -> dict[str, int]:
         """Header stamps of the first and the last evaluated frame; none without any."""
-        stamps = self.frames["stamp_ns"]
-        return (
-            {"start_ns": int(stamps.iloc[0]), "end_ns": int(stamps.iloc[-1])} if len(stamps) else {}
-        )
+        stamps = self.frames["stamp_ns"].tolist()
+        return {"start_ns": stamps[0], "end_ns": stamps[-1]} if stamps else {}
