@@ -176,6 +176,7 @@ def _schema_of(kind: Any) -> Schema:
 
 ROOT: Final = "/roadeval"
 METRICS: Final = "roadeval.Metrics"
+_COUNTS: Final = ("TP", "TN", "FP", "FN", "N")
 _INTEGER: Final = {"type": "integer"}
 _RATE: Final = {"type": ["number", "null"], "description": "a fraction; null if undefined"}
 
@@ -210,17 +211,12 @@ class SidecarWriter(LogWriter):
         for topic, image in images.items():
             self.mask(topic, stamp, image, log_time_ns=log_time, frame_id=frame_id or FRAME_ID)
         for tally in result.tallies:
-            counts = tally.counts
             message: dict[str, Any] = {
                 "timestamp": {"sec": stamp // NS, "nsec": stamp % NS},
                 "frame": frame.number,
                 "variant": tally.variant,
                 "stage": tally.stage,
-                "TP": counts.tp,
-                "TN": counts.tn,
-                "FP": counts.fp,
-                "FN": counts.fn,
-                "N": counts.n,
+                **{name: getattr(tally.counts, name.lower()) for name in _COUNTS},
                 **{name: None if math.isnan(rate) else rate for name, rate in tally.rates.items()},
             }
             data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
@@ -232,7 +228,7 @@ class SidecarWriter(LogWriter):
 def _metrics_schema(rates: tuple[str, ...]) -> Schema:
     """Return the JSON Schema of the metrics, with Foxglove's form of a time."""
     time = {"type": "object", "title": "time", "properties": {"sec": _INTEGER, "nsec": _INTEGER}}
-    counts = dict.fromkeys(("frame", "TP", "TN", "FP", "FN", "N"), _INTEGER)
+    counts = dict.fromkeys(("frame", *_COUNTS), _INTEGER)
     properties = {"timestamp": time, "variant": {"type": "string"}, "stage": {"type": "string"}}
     properties |= counts | dict.fromkeys(rates, _RATE)
     text = json.dumps({"title": METRICS, "type": "object", "properties": properties})
