@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 PIXELS: Final = ("log_digest", "truth", "frames", "road", "N")
 """Columns that tell whether two runs scored the same pixels of a drive."""
-MASK_RATES: Final = (TESTED, "FPR", "FNR")
+RATES: Final = (TESTED, "FPR", "FNR")
 """The rates of a whole mask that are searched; of a part of its pixels only the first is."""
 
 
@@ -95,7 +95,7 @@ def find_lines(rows: pd.DataFrame, tags: Mapping[str, str], count: int) -> list[
     searched = [
         (address, rate, part)
         for address, part in parts
-        for rate in (MASK_RATES if address[1] == ALL else MASK_RATES[:1])
+        for rate in (RATES if address[1] == ALL else RATES[:1])
     ]
     names = titles(values_of(only(rows, kind="region"), "part"))
     family = len(searched)

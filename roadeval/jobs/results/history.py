@@ -19,19 +19,13 @@ from roadeval.data.words import first_of, setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import changed_settings
 from roadeval.evaluation.comparison.conditions import Condition
-from roadeval.evaluation.comparison.history import (
-    MASK_RATES,
-    Line,
-    find_changes,
-    find_lines,
-    judge_last,
-)
+from roadeval.evaluation.comparison.history import RATES, Line, find_changes, find_lines, judge_last
 from roadeval.evaluation.comparison.pairing import common_masks
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
-from roadeval.evaluation.tables import KEY, concatenate, finals, most_changed_frames, only
+from roadeval.evaluation.tables import KEY, MASK, concatenate, finals, most_changed_frames, only
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
@@ -59,10 +53,7 @@ UNKNOWN: Final = "nothing that the results know of"
 BATCH: Final = 50
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
-    "scores": (
-        *(*KEY, "variant", "stage", "final", "region", "frames", "TP", "FN", "N", "truth"),
-        *MASK_RATES,
-    ),
+    "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *RATES),
     "drives": (*KEY, "name", "log_digest", "group", "status"),
     "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
 }
@@ -253,7 +244,7 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     about = about.merge(only(scores, region=ALL)[[*key, "truth"]].drop_duplicates(key), on=key)
     for other in ("log_digest", "drive"):
         about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
-    names = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *MASK_RATES]
+    names = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *RATES]
     parts = [part.reindex(columns=names) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
     rows = rows.merge(about, on=key)
