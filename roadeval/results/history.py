@@ -139,7 +139,7 @@ def verdict(history: History) -> str:
         there = max((sum(map(defined, line.rates.tolist())) for line in masks), default=0)
         if there < 2:
             return f"{focus} is in {there} of {count}, which tells no change."
-        return f"{focus} did not change in {counted(there, 'run')}."
+        return f"No change of {focus} in {counted(there, 'run')} is more than chance may do."
     standing = history.standing
     ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or of_focus[-1:]
     first = ranked[0].first

@@ -132,6 +132,10 @@ def test_whether_a_rise_stands_is_no_matter_of_the_last_run_alone(made):
     assert replace(made, events=[replace(event, changes=[change])]).last_good == made.runs[4]
 
 
+def test_two_runs_that_differ_are_not_called_equal(nights):
+    assert "chance" in verdict(history([nights / "4", nights / "5"]))
+
+
 def test_times_that_are_none_put_a_run_first_or_last(nights, tmp_path):
     folder = shutil.copytree(nights, tmp_path / "nights")
     for night, made_ns in (("2", -(10**30)), ("3", 10**30)):

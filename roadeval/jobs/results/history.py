@@ -99,9 +99,8 @@ def history(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     lost: list[str] = []
-    paths = [path for given in list_paths(results) for path in find_results(local_path(given))]
     opened: dict[Path, Result] = {}
-    for path in paths:
+    for path in list_results(results):
         try:
             opened[path] = Result(path)
             if not opened[path].complete:
@@ -133,6 +132,11 @@ def history(
         event.frames.extend(_changed_frames(read, event))
     judged = judge_last(lines, conditions, last, settings, within)
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
+
+
+def list_results(results: Paths) -> list[Path]:
+    """Return the paths of results, and of those below folders."""
+    return [path for given in list_paths(results) for path in find_results(local_path(given))]
 
 
 def find_results(path: Path) -> list[Path]:
