@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.world.noise import Field
-from roadeval.data.arrays import Flags, Matrix
+from roadeval.data.arrays import Flags, Floats
 
 FOCAL_OVER_WIDTH: Final = 0.875
 """Focal length in image widths: a horizontal field of view of 59 degrees."""
@@ -33,7 +33,7 @@ class Pose:
     pitch: float = 0.0
     roll: float = 0.0
 
-    def axes(self) -> Matrix:
+    def axes(self) -> Floats:
         """``(3, 3)``: the image's right, down and forward directions in the world, as rows."""
         sin_y, cos_y = np.sin(self.yaw), np.cos(self.yaw)
         sin_p, cos_p = np.sin(self.pitch), np.cos(self.pitch)
@@ -58,17 +58,17 @@ class Camera:
         return FOCAL_OVER_WIDTH * self.width
 
     @cached_property
-    def axes(self) -> Matrix:
+    def axes(self) -> Floats:
         """``(3, 3)``: the image's right, down and forward directions in the world, as rows."""
         return self.pose.axes()
 
     @cached_property
-    def position(self) -> Matrix:
+    def position(self) -> Floats:
         """``(3,)`` metres."""
         return np.array([self.pose.x, self.pose.y, self.pose.z])
 
     @cached_property
-    def projection(self) -> Matrix:
+    def projection(self) -> Floats:
         """``(3, 3)``: from a world direction to homogeneous (column, row) of its pixel."""
         centre_x, centre_y = (self.width - 1) / 2, (self.height - 1) / 2
         intrinsics = np.array(
@@ -85,16 +85,16 @@ class Camera:
         along = (rows / np.float32(self.focal))[:, None] * down
         return np.asarray(across[None, :, :] + along[:, None, :])
 
-    def project(self, points: Matrix) -> Matrix:
+    def project(self, points: Floats) -> Floats:
         """Project ``(n, 3)`` world points in front of the camera to ``(n, 2)`` column and row."""
         image = (points - self.position) @ self.projection.T
         return np.asarray(image[:, :2] / image[:, 2:])
 
-    def depth(self, points: Matrix) -> Matrix:
+    def depth(self, points: Floats) -> Floats:
         """``(n,)`` distance of ``(n, 3)`` world points along the optical axis, metres."""
         return np.asarray((points - self.position) @ self.axes[2])
 
-    def catches(self, corners: Matrix) -> Flags:
+    def catches(self, corners: Floats) -> Flags:
         """Return which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
 
         Points behind it, to either side, or too low in the image are left out.
@@ -107,12 +107,12 @@ class Camera:
         height = np.ptp(corners[..., 1], axis=1) / before.min(1) * self.focal
         return np.asarray((depth.max(1) > NEAR) & ~beside & (height >= LEAST))
 
-    def outline(self, corners: Matrix) -> Matrix:
+    def outline(self, corners: Floats) -> Floats:
         """Project the part of a polygon, ``(n, 3)``, that is not behind: ``(m, 2)``, m maybe 0."""
         depth = self.depth(corners)
         if depth.min() >= NEAR:
             return self.project(corners)
-        corners: list[Matrix] = []
+        corners: list[Floats] = []
         for here, there, d0, d1 in zip(
             corners, np.roll(corners, -1, 0), depth, np.roll(depth, -1), strict=True
         ):

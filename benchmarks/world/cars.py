@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.world.light import Sun
 from benchmarks.world.noise import Field, Reflectance
 from benchmarks.world.panel import Panel, Picture
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 PIXELS_PER_METRE: Final = 90.0
 WIDTH: Final = 1.76
@@ -108,7 +108,7 @@ class Car:
     """
 
     look: CarPaint
-    foot: Matrix
+    foot: Floats
     heading: float
     sunlit: float
 
@@ -133,20 +133,20 @@ class Car:
             )
         )
 
-    def shadow(self, sun: Sun) -> list[Matrix]:
+    def shadow(self, sun: Sun) -> list[Floats]:
         """Outlines of the car's shadow on the ground, ``(n, 3)`` metres each."""
         begin, end, height = CABIN
         if self.look.oncoming:
             begin, end = LENGTH - end, LENGTH - begin
         return [self._outline(sun, *BODY), self._outline(sun, begin, end, height)]
 
-    def footprint(self) -> Matrix:
+    def footprint(self) -> Floats:
         """``(4, 3)`` corners of the ground below the car."""
         across, along = self._axes()
         corners = [(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)]
         return np.array([self.foot + x * WIDTH * across + z * LENGTH * along for x, z in corners])
 
-    def _outline(self, sun: Sun, begin: float, end: float, height: float) -> Matrix:
+    def _outline(self, sun: Sun, begin: float, end: float, height: float) -> Floats:
         across, along = self._axes()
         corners = np.array(
             [self.foot + x * WIDTH * across + z * along + (0.0, y, 0.0)
@@ -155,7 +155,7 @@ class Car:
         hull = cv2.convexHull(sun.shadow_of(corners).astype(np.float32))[:, 0].astype(np.float64)
         return np.insert(hull, 1, 0.0, axis=1)
 
-    def _axes(self) -> tuple[Matrix, Matrix]:
+    def _axes(self) -> tuple[Floats, Floats]:
         sin, cos = np.sin(self.heading), np.cos(self.heading)
         return np.array([cos, 0.0, -sin]), np.array([sin, 0.0, cos])
 

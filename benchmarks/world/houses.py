@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.world.noise import Field, Reflectance, coloured_noise
 from benchmarks.world.panel import Panel, Picture
 from benchmarks.world.shadows import Silhouettes, SunMap
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 PIXELS_PER_METRE: Final = 28.0
 STOREY: Final = 2.8
@@ -54,8 +54,8 @@ class House:
         Reflectances.
     """
 
-    low: Matrix
-    high: Matrix
+    low: Floats
+    high: Floats
     ridge: float
     side: float
     wall: Reflectance
@@ -163,7 +163,7 @@ def _tiles(panel: Panel, colour: Reflectance, rng: np.random.Generator) -> Field
     return _blank(panel, colour, courses[:, None] + weather)
 
 
-def _lit(panel: Panel, image: Field, normal: Matrix, sky: float, shade: SunMap) -> Panel:
+def _lit(panel: Panel, image: Field, normal: Floats, sky: float, shade: SunMap) -> Panel:
     """Hang an image on the panel, in the sun that reaches each of its points."""
     rows, columns = image.shape[:2]
     right = (np.arange(columns) + 0.5)[None, :, None] / columns * panel.right

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.world.noise import Field
 from roadeval.data import Mask
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 SUN_RADIUS: Final = np.radians(0.2665)
 """Angular radius of the sun's disc as seen from the Earth."""
@@ -41,19 +41,19 @@ class Sun:
     azimuth: float
 
     @property
-    def towards(self) -> Matrix:
+    def towards(self) -> Floats:
         """``(3,)`` unit vector that points at the sun."""
         level = np.cos(self.elevation)
         return np.array(
             [level * np.sin(self.azimuth), np.sin(self.elevation), level * np.cos(self.azimuth)]
         )
 
-    def shadow_of(self, points: Matrix) -> Matrix:
+    def shadow_of(self, points: Floats) -> Floats:
         """``(n, 2)`` ground X and Z where ``(n, 3)`` points cast their shadow."""
         towards = self.towards
         return np.asarray(points[:, [0, 2]] - points[:, 1:2] * towards[[0, 2]] / towards[1])
 
-    def facing(self, normal: Matrix) -> float:
+    def facing(self, normal: Floats) -> float:
         """Cosine between a surface's normal and the sun, 0 if it faces away."""
         return max(0.0, float(normal @ self.towards))
 

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.world.camera import NEAR, Camera
 from benchmarks.world.light import Light
 from benchmarks.world.noise import Field
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 HAZE_LENGTH: Final = 2600.0
 """Distance at which the air has replaced all but 1/e of the light behind it, metres."""
@@ -93,12 +93,12 @@ class Panel:
     """
 
     picture: Picture
-    corner: Matrix
-    right: Matrix
-    down: Matrix
+    corner: Floats
+    right: Floats
+    down: Floats
     sunlit: float = 1.0
 
-    def corners(self) -> Matrix:
+    def corners(self) -> Floats:
         """``(4, 3)`` metres, around the panel."""
         beside, below = self.corner + self.right, self.corner + self.down
         return np.array([self.corner, beside, beside + self.down, below])
@@ -166,7 +166,7 @@ def _warped(panel: Panel, camera: Camera, depth: float, window: Window) -> tuple
     return sun, cv2.warpPerspective(panel.picture.sky[level], place, size)
 
 
-def _inside(outline: Matrix, window: Window) -> Field:
+def _inside(outline: Floats, window: Window) -> Field:
     """``(h, w, 1)``: 1 inside of an outline; otherwise parts behind the camera would appear too."""
     left, top, right, bottom = window
     inside = np.zeros((bottom - top, right - left, 1), np.float32)
@@ -174,7 +174,7 @@ def _inside(outline: Matrix, window: Window) -> Field:
     return inside
 
 
-def _window(outline: Matrix, camera: Camera) -> Window | None:
+def _window(outline: Floats, camera: Camera) -> Window | None:
     """Return the part of the image that an outline touches; None if it misses."""
     if not len(outline):
         return None
@@ -193,7 +193,7 @@ def _level(panel: Panel, camera: Camera, depth: float) -> int:
 
 def _homography(
     panel: Panel, camera: Camera, shape: tuple[int, ...], left: int, top: int
-) -> Matrix:
+) -> Floats:
     """``(3, 3)``: from the picture's pixels to the image's, counted from ``left`` and ``top``."""
     right, down = panel.right / shape[1], panel.down / shape[0]
     first = panel.corner + (right + down) / 2 - camera.position

@@ -17,7 +17,7 @@ from benchmarks.world.light import Sun
 from benchmarks.world.noise import Field
 from benchmarks.world.panel import Picture
 from benchmarks.world.standing import Rod, Standing
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 PIXELS_PER_METRE: Final = 44.0
 LEAF: Final = 0.05
@@ -62,13 +62,13 @@ def grow(species: Species, sun: Sun, rng: np.random.Generator) -> Standing:
     return Standing(_paint(species, leaves, rods, sun, rng), half_width, height, leaves, rods)
 
 
-def _extent(leaves: Matrix) -> tuple[float, float]:
+def _extent(leaves: Floats) -> tuple[float, float]:
     """Half width and height of the picture that holds all leaves, metres."""
     margin = 2 * LEAF
     return float(np.abs(leaves[:, 0]).max()) + margin, float(leaves[:, 1].max()) + margin
 
 
-def _tufts(species: Species, rng: np.random.Generator) -> Matrix:
+def _tufts(species: Species, rng: np.random.Generator) -> Floats:
     """``(n, 3)`` centres of the tufts that make up the crown, most of them near its surface."""
     direction = rng.normal(size=(species.tufts, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -79,7 +79,7 @@ def _tufts(species: Species, rng: np.random.Generator) -> Matrix:
     return np.stack([away[:, 0] * radius, height, away[:, 2] * radius], axis=1)
 
 
-def _leaves(species: Species, tufts: Matrix, rng: np.random.Generator) -> Matrix:
+def _leaves(species: Species, tufts: Floats, rng: np.random.Generator) -> Floats:
     """``(n, 3)`` leaves: flattened clouds about the tufts, none below the ground."""
     sizes = rng.gamma(3.0, 1.0, len(tufts))
     tuft = rng.choice(len(tufts), species.leaves, p=sizes / sizes.sum())
@@ -88,7 +88,7 @@ def _leaves(species: Species, tufts: Matrix, rng: np.random.Generator) -> Matrix
     return np.asarray(leaves[leaves[:, 1] > 0.03])
 
 
-def _branches(species: Species, tufts: Matrix, rng: np.random.Generator) -> Iterator[Rod]:
+def _branches(species: Species, tufts: Floats, rng: np.random.Generator) -> Iterator[Rod]:
     """Yield the trunk, then a branch from it to every third tuft."""
     if species.stem == 0.0:
         return
@@ -103,7 +103,7 @@ def _branches(species: Species, tufts: Matrix, rng: np.random.Generator) -> Iter
         yield Rod(bend, tuft, 0.03)
 
 
-def light_left(points: Matrix, towards: Matrix, opacity: float) -> Field:
+def light_left(points: Floats, towards: Floats, opacity: float) -> Field:
     """Share of a distant light that leaves before a leaf let through to it.
 
     Parameters
@@ -134,7 +134,7 @@ def light_left(points: Matrix, towards: Matrix, opacity: float) -> Field:
 
 
 def _paint(
-    species: Species, leaves: Matrix, rods: Sequence[Rod], sun: Sun, rng: np.random.Generator
+    species: Species, leaves: Floats, rods: Sequence[Rod], sun: Sun, rng: np.random.Generator
 ) -> Picture:
     """Paint the far half of the leaves, then the wood, then the near half."""
     middles = np.array([(rod.foot + rod.tip) / 2 for rod in rods]).reshape(-1, 3)
@@ -170,14 +170,14 @@ class _Canvas:
         size = round(height * PIXELS_PER_METRE), round(2 * half_width * PIXELS_PER_METRE), 4
         return cls(np.zeros(size, np.float32), np.zeros(size, np.float32), half_width)
 
-    def pixels(self, points: Matrix) -> list[list[int]]:
+    def pixels(self, points: Floats) -> list[list[int]]:
         """Column and row of each of ``(n, 3)`` points."""
         column = (points[:, 0] + self.half_width) * PIXELS_PER_METRE
         row = self.sun.shape[0] - points[:, 1] * PIXELS_PER_METRE
         pixels: list[list[int]] = np.rint(np.stack([column, row], axis=1)).astype(int).tolist()
         return pixels
 
-    def leaves(self, at: Matrix, by_sun: Field, by_sky: Field, rng: np.random.Generator) -> None:
+    def leaves(self, at: Floats, by_sun: Field, by_sky: Field, rng: np.random.Generator) -> None:
         """Paint clusters of leaves in order, as small turned ellipses."""
         radii = rng.uniform((0.55, 0.3), (1.2, 0.8), (len(at), 2)) * LEAF * PIXELS_PER_METRE
         for centre, axes, angle, sun, sky in zip(

@@ -17,7 +17,7 @@ from benchmarks.world.panel import Panel
 from benchmarks.world.road import HALF_WIDTH, Road
 from benchmarks.world.shadows import Silhouettes, SunMap
 from benchmarks.world.standing import Standing
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 BEHIND: Final = 15.0
 """Things stand from this far behind the start ..."""
@@ -41,7 +41,7 @@ class Placed:
     """A standing thing with its foot at ``(3,)`` metres, ``scale`` times its size."""
 
     thing: Standing
-    foot: Matrix
+    foot: Floats
     scale: float
 
     def occlude(self, silhouettes: Silhouettes) -> None:
@@ -179,7 +179,7 @@ class Roadside:
     def _any(self, kinds: list[Standing]) -> Standing:
         return kinds[self.rng.integers(len(kinds))]
 
-    def _foot(self, side: float, away: float, z: float) -> Matrix:
+    def _foot(self, side: float, away: float, z: float) -> Floats:
         """``(3,)`` point of the ground ``away`` metres from the asphalt's left or right edge."""
         at = np.array([z])
         left, right = self.road.edges(at)

@@ -16,7 +16,7 @@ from benchmarks.world.roadside import BEHIND, Roadside
 from benchmarks.world.shadows import Silhouettes, SunMap
 from benchmarks.world.sky import Sky
 from benchmarks.world.texture import GroundTexture
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 SHADED_AHEAD: Final = 110.0
 """Shadows lie on the ground up to this far beyond the end of the drive, metres."""
@@ -52,7 +52,7 @@ class Scene:
     sunlight: GroundTexture
     hidden_sky: GroundTexture
     panels: tuple[Panel, ...]
-    corners: Matrix
+    corners: Floats
 
 
 def build(journey: Journey, rng: np.random.Generator) -> Scene:

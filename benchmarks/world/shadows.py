@@ -20,7 +20,7 @@ from benchmarks.world.light import SUN_RADIUS, Sun
 from benchmarks.world.noise import Field
 from benchmarks.world.road import Road
 from benchmarks.world.texture import GroundTexture
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 CELL: Final = 0.04
 """Side of a map cell, metres: about the penumbra's radius at ten metres."""
@@ -71,7 +71,7 @@ class Silhouettes:
         self._solid = [np.zeros(shape, np.uint8) for _ in range(layers)]
         self._leaves = [np.zeros(shape, np.uint8) for _ in range(layers)]
 
-    def add_leaves(self, points: Matrix) -> None:
+    def add_leaves(self, points: Floats) -> None:
         """Add clusters of leaves, ``(n, 3)`` metres."""
         cells = np.floor(self._cells(points)).astype(np.int64)
         rows, columns = self._solid[0].shape
@@ -81,7 +81,7 @@ class Silhouettes:
             column, row = cells[on_map & (layer == k)].T
             leaves[row, column] = 255
 
-    def add_rods(self, feet: Matrix, tips: Matrix, radii: Matrix) -> None:
+    def add_rods(self, feet: Floats, tips: Floats, radii: Floats) -> None:
         """Add straight trunks, branches or poles.
 
         ``feet`` and ``tips`` are ``(n, 3)``, ``radii`` ``(n,)``, all in metres. Each is cut into
@@ -105,7 +105,7 @@ class Silhouettes:
         ):
             cv2.line(self._solid[layer], a, b, 255, width, cv2.LINE_8, 4)
 
-    def add_box(self, low: Matrix, high: Matrix) -> None:
+    def add_box(self, low: Floats, high: Floats) -> None:
         """Add an upright box between two opposite corners, ``(3,)`` metres each."""
         for k, (floor, ceiling) in enumerate(pairwise(HEIGHTS)):
             bottom, top = max(low[1], floor), min(high[1], ceiling)
@@ -128,16 +128,16 @@ class Silhouettes:
             visible.append(255 - cv2.filter2D(blocked, -1, disc_of_the_sun(self.sun, height)))
         return SunMap(self.road, self.sun, self.start, tuple(visible))
 
-    def _cells(self, points: Matrix) -> Matrix:
+    def _cells(self, points: Floats) -> Floats:
         """``(n, 2)`` column and row, in cells from the map's outer corner, of points' shadows."""
         return to_cells(self.road, self.start, self.sun.shadow_of(points))
 
-    def _layers(self, heights: Matrix) -> npt.NDArray[np.intp]:
+    def _layers(self, heights: Floats) -> npt.NDArray[np.intp]:
         """``(n,)`` numbers of the layers that ``(n,)`` heights lie in."""
         return np.searchsorted(HEIGHTS, heights, "right").clip(1, len(HEIGHTS) - 1) - 1
 
 
-def to_cells(road: Road, start: float, ground: Matrix) -> Matrix:
+def to_cells(road: Road, start: float, ground: Floats) -> Floats:
     """Columns and rows of ``(n, 2)`` ground X and Z, in cells from the map's outer corner."""
     offset = ground[:, 0] - road.centre(ground[:, 1])
     return np.stack([(offset + REACH) / CELL, (ground[:, 1] - start) / CELL], axis=1)
@@ -173,7 +173,7 @@ class SunMap:
         hidden = SKY_HIDDEN * cv2.GaussianBlur(coarse, (0, 0), SKY_BLUR / (8 * CELL))
         return GroundTexture.averaged(hidden, 8 * CELL, -REACH, self.start, outside=0.0)
 
-    def visible_from(self, points: Matrix) -> Field:
+    def visible_from(self, points: Floats) -> Field:
         """``(h, w)`` share of the sun's disc seen from ``(h, w, 3)`` points.
 
         Only the layers wholly above a point count, so that no wall stands in its own way.

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.world.panel import Panel, Picture
 from benchmarks.world.shadows import Silhouettes
-from roadeval.data.arrays import Matrix
+from roadeval.data.arrays import Floats
 
 NO_LEAVES: Final = np.empty((0, 3))
 
@@ -21,8 +21,8 @@ NO_LEAVES: Final = np.empty((0, 3))
 class Rod:
     """A straight piece of wood or metal between two ``(3,)`` points, metres."""
 
-    foot: Matrix
-    tip: Matrix
+    foot: Floats
+    tip: Floats
     radius: float
 
 
@@ -37,16 +37,16 @@ class Standing:
     picture: Picture
     half_width: float
     height: float
-    leaves: Matrix
+    leaves: Floats
     rods: tuple[Rod, ...]
 
-    def panel(self, foot: Matrix, scale: float) -> Panel:
+    def panel(self, foot: Floats, scale: float) -> Panel:
         """Return its panel with the foot at ``(3,)``, ``scale`` times as large."""
         corner = foot + scale * np.array([-self.half_width, self.height, 0.0])
         right = scale * np.array([2 * self.half_width, 0.0, 0.0])
         return Panel(self.picture, corner, right, scale * np.array([0.0, -self.height, 0.0]))
 
-    def occlude(self, silhouettes: Silhouettes, foot: Matrix, scale: float) -> None:
+    def occlude(self, silhouettes: Silhouettes, foot: Floats, scale: float) -> None:
         """Stand in the sun's way."""
         silhouettes.add_leaves(foot + scale * self.leaves)
         if self.rods:

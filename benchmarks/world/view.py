@@ -15,7 +15,7 @@ from benchmarks.world.noise import Field
 from benchmarks.world.panel import HAZE_LENGTH, Film, draw
 from benchmarks.world.scene import Scene
 from benchmarks.world.sky import air
-from roadeval.data.arrays import Flags, Matrix
+from roadeval.data.arrays import Flags, Floats
 
 FARTHEST: Final = 420.0
 """The ground ends here and the far view begins, metres."""
@@ -97,7 +97,7 @@ def _shade_by_cars(sun: Field, hidden: Field, rows: slice, scene: Scene, now: Mo
         np.maximum(hidden, np.float32(UNDER_CAR) * below, out=hidden)
 
 
-def _cover(outline: Matrix, camera: Camera, rows: slice) -> Field:
+def _cover(outline: Floats, camera: Camera, rows: slice) -> Field:
     """``(h, W)`` share of the pixels of some rows that a polygon on the ground covers."""
     cover = np.zeros((rows.stop - rows.start, camera.width), np.uint8)
     corners = camera.outline(outline)

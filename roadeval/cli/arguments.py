@@ -165,8 +165,6 @@ def _mask_tables(name: str, path: str) -> dict[str, Any]:
 
 
 Camera = Annotated[str | None, option("--camera", "One of several cameras.", "NAME")]
-
-
 Focus = Annotated[
     str | None,
     option("--focus", "Variant to speak of. Default: what you brought, else filtered.", "NAME"),

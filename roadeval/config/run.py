@@ -99,11 +99,8 @@ class RunConfig(LogConfig):
             names.add(name)
         for name in self.only:
             if name not in names:
-                raise ConfigError(
-                    f"there is no variant {name}",
-                    setting="only",
-                    remedy=f"{likely(name, names)}choose {list_names(names)}",
-                )
+                remedy = f"{likely(name, names)}choose {list_names(names)}"
+                raise ConfigError(f"there is no variant {name}", setting="only", remedy=remedy)
         self._check_cameras()
         try:
             RecordRule.parse(self.output.record)
@@ -139,10 +136,8 @@ class RunConfig(LogConfig):
     def variants(self) -> tuple[Variant, ...]:
         """Return the variants that are computed: the two by default, then the extra ones."""
         trained = [name for name, masks in self.masks.items() if masks.decide == TRAINED]
-        variants = (
-            *variants_of(self.pipeline, self.extra, self.preset),
-            *map(thresholded_variant, trained),
-        )
+        made = variants_of(self.pipeline, self.extra, self.preset)
+        variants = (*made, *map(thresholded_variant, trained))
         return tuple(v for v in variants if not self.only or v.name in self.only)
 
     def names(self) -> list[str]:
@@ -227,10 +222,8 @@ class RunConfig(LogConfig):
         same name. A `ConfigError` for a key or a value that cannot be used, with what is allowed.
         """
         pipeline = pipeline_of(self.pipeline, tables)
-        check_tables(
-            tables,
-            (*("chain", "only", *pipeline.settings, "variants", "masks", "cameras"), *SECTIONS),
-        )
+        names = ("chain", "only", *pipeline.settings, "variants", "masks", "cameras", *SECTIONS)
+        check_tables(tables, names)
         only = tables.get("only", self.only)
         if not isinstance(only, list | tuple) or not all(isinstance(name, str) for name in only):
             raise ConfigError("must be a list of variants' names", setting="only")
@@ -240,9 +233,7 @@ class RunConfig(LogConfig):
             only=tuple(only),
             extra=self._with_variants(tables.get("variants", {})),
             masks=with_masks(self.masks, tables.get("masks", {})),
-            **{
-                name: override(getattr(self, name), tables.get(name, {}), name) for name in SECTIONS
-            },
+            **{t: override(getattr(self, t), tables.get(t, {}), t) for t in SECTIONS},
         )
         if "cameras" in tables:
             config = replace(config, cameras=_read_cameras(tables["cameras"]))
@@ -261,9 +252,8 @@ class RunConfig(LogConfig):
 
         A `ConfigError` if there is no such method, or it learns itself; see `tuned_variant`.
         """
-        pipelines = {
-            v.name: v.pipeline for v in variants_of(self.pipeline, self.extra, self.preset)
-        }
+        made = variants_of(self.pipeline, self.extra, self.preset)
+        pipelines = {variant.name: variant.pipeline for variant in made}
         masks = {*self.topics.masks, *self.masks}
         variants = []
         for name in names:

@@ -19,8 +19,6 @@ Plane = npt.NDArray[np.uint8]
 """``(H, W)``: a channel, codes of any kind, or a mask, nonzero inside."""
 Planes = tuple[Plane, Plane, Plane]
 """Red, green and blue."""
-CodeTable = npt.NDArray[np.uint8]
-"""``(n, m)``: a code for each pair of numbers."""
 Labels = npt.NDArray[np.int32]
 """``(H, W)``: a component's number at each of its pixels, 0 outside."""
 Runs = npt.NDArray[np.int32]
@@ -44,10 +42,6 @@ Values = npt.NDArray[np.floating]
 """float32 of any shape. The type is wider because NumPy's stubs widen it with Python floats."""
 Floats = npt.NDArray[np.float64]
 """float64 of any shape."""
-Vector = npt.NDArray[np.float64]
-"""``(n,)``."""
-Matrix = npt.NDArray[np.float64]
-"""``(n, m)``."""
 Bits = npt.NDArray[np.uint64]
 """``(H, words)`` of an ``(H, W)`` mask, C-contiguous, 64 pixels a word, the leftmost in the lowest
 bit; bits beyond the width are 0. K masks are ``(K, H, words)``."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import CODES, NON_ROAD, ROAD, Histogram, Probability, Truth
-from roadeval.data.arrays import Bits, Floats, Matrix, Plane, Sums, TruthBits, pack, unpack
+from roadeval.data.arrays import Bits, Floats, Plane, Sums, TruthBits, pack, unpack
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.geometry.ground import Ground
 from roadeval.geometry.plan import OUTSIDE, Plan, pixels_of
@@ -159,7 +159,7 @@ class Survey:
             lines.append(self._line(ground, np.column_stack([ahead, 0 * ahead]), ahead))
         return lines
 
-    def _line(self, ground: Ground, places: Matrix, along: Floats) -> _Line:
+    def _line(self, ground: Ground, places: Floats, along: Floats) -> _Line:
         seen = pixels_of(ground, places)
         inside: Pixels = np.flatnonzero(seen != OUTSIDE)
         if not len(inside):

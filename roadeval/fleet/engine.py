@@ -67,9 +67,9 @@ def start_workers(
                 stack.callback(os.environ.pop, "PYTHONSAFEPATH", None)
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or dask.system.CPU_COUNT
-            client = stack.enter_context(_start_cluster(distributed, count))
+            client = _start_cluster(stack, distributed, count)
         else:
-            client = stack.enter_context(_connect(distributed, scheduler))
+            client = _connect(stack, distributed, scheduler)
             count = len(client.scheduler_info(n_workers=-1)["workers"])
         executor = client.get_executor(pure=False)
         stack.callback(executor.shutdown, wait=False)
@@ -81,49 +81,41 @@ def is_worker_death(error: BaseException) -> bool:
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
 
 
-@contextmanager
-def _start_cluster(distributed: Any, count: int) -> Iterator[Any]:
-    with ExitStack() as stack:
-        try:
-            cluster = distributed.LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address=None,
-                worker_dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            )
-            client = distributed.Client(stack.enter_context(cluster))
-        except (OSError, RuntimeError) as error:
-            raise FleetError(
-                f"the worker processes cannot be started ({error})",
-                remedy=Sentence(
-                    "give them more memory, processes or open files (see ulimit -a), or take fewer "
-                    "{run.jobs}"
-                ),
-            ) from error
-        yield stack.enter_context(client)
+def _start_cluster(stack: ExitStack, distributed: Any, count: int) -> Any:
+    """Return a client of worker processes, which end with the stack."""
+    try:
+        cluster = distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            worker_dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )
+        client = distributed.Client(stack.enter_context(cluster))
+    except (OSError, RuntimeError) as error:
+        more = "give them more memory, processes or open files (see ulimit -a)"
+        raise FleetError(
+            f"the worker processes cannot be started ({error})",
+            remedy=Sentence("{}, or take fewer {run.jobs}", more),
+        ) from error
+    return stack.enter_context(client)
 
 
-@contextmanager
-def _connect(distributed: Any, scheduler: str) -> Iterator[Any]:
-    # The library logs every attempt to connect.
-    logger = logging.getLogger("distributed")
-    level = logger.level
+def _connect(stack: ExitStack, distributed: Any, scheduler: str) -> Any:
+    """Return a client of a scheduler, which is closed with the stack."""
+    logger = logging.getLogger("distributed")  # it would log every attempt to connect
+    stack.callback(logger.setLevel, logger.level)
     logger.setLevel(logging.CRITICAL)
     is_file = os.path.exists(scheduler)  # noqa: PTH110 - an address may be no path
     try:
-        try:
-            place = {"scheduler_file" if is_file else "address": scheduler}
-            client = distributed.Client(**place, timeout=ANSWER_S)
-        except (OSError, TimeoutError, ValueError, TypeError) as error:
-            raise FleetError(
-                f"{scheduler} does not answer within {ANSWER_S} s, or is no Dask scheduler",
-                setting="fleet.scheduler",
-                remedy="name it as tcp://host:8786, or by the file that it has written",
-            ) from error
-        with client:
-            yield client
-    finally:
-        logger.setLevel(level)
+        place = {"scheduler_file" if is_file else "address": scheduler}
+        client = distributed.Client(**place, timeout=ANSWER_S)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        raise FleetError(
+            f"{scheduler} does not answer within {ANSWER_S} s, or is no Dask scheduler",
+            setting="fleet.scheduler",
+            remedy="name it as tcp://host:8786, or by the file that it has written",
+        ) from error
+    return stack.enter_context(client)

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import Calibration, Mounting
-from roadeval.data.arrays import Floats, Matrix
+from roadeval.data.arrays import Floats
 from roadeval.data.calibration import FISHEYE
 from roadeval.errors import RoadevalError
 from roadeval.geometry.settings import GroundSettings
@@ -64,7 +64,7 @@ class Ground:
         matrix += (factors / 2 - 0.5)[:, None] * matrix[2]
         return replace(self, width=width, height=height, matrix=_flat(matrix))
 
-    def pixels(self, places: Matrix) -> Matrix:
+    def pixels(self, places: Floats) -> Floats:
         """Return the pixels of places, ``(n, 2)``, also outside the image; NaN if not seen."""
         rays = _apply(self.plane, places)
         if self.distortion:
@@ -73,15 +73,15 @@ class Ground:
             rays = _distort(rays, self.model, self.distortion)
         return _apply(self.matrix, rays)
 
-    def places(self, pixels: Matrix) -> Matrix:
+    def places(self, pixels: Floats) -> Floats:
         """Return the places of pixels on the ground, ``(n, 2)``; NaN at and above the horizon."""
         return self.places_of(self.rays(pixels))
 
-    def places_of(self, rays: Matrix) -> Matrix:
+    def places_of(self, rays: Floats) -> Floats:
         """Return the places of `rays` on the ground, ``(n, 2)``; NaN at and above the horizon."""
         return _apply(_inverse(self.plane), rays)
 
-    def distances(self) -> Matrix:
+    def distances(self) -> Floats:
         """Return the metres to the ground at each pixel, ``(H, W)``; NaN where no ray is.
 
         Above the horizon they are negative: to the plane that is as far above the camera.
@@ -113,7 +113,7 @@ class Ground:
         at[2] += height
         return replace(self, plane=_plane(turn @ _rotation(LEFT, pitch).T, at))
 
-    def axes(self) -> tuple[Matrix, Floats]:
+    def axes(self) -> tuple[Floats, Floats]:
         """Return the rotation from ahead, left, up to the camera's axes, and their origin there."""
         first, second, third = np.reshape(self.plane, (3, 3)).T
         return np.stack([first, second, np.cross(first, second)], axis=1), third
@@ -130,7 +130,7 @@ class Ground:
         end = int(np.argmax(falls)) + 1 if falls.any() else len(seen)
         return slopes[:end], seen[:end]
 
-    def rays(self, pixels: Matrix) -> Matrix:
+    def rays(self, pixels: Floats) -> Floats:
         """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down.
 
         NaN if there is none, or one at more than a right angle to the camera's axis.
@@ -168,7 +168,7 @@ def _growth(slope: Floats, model: str, distortion: Sequence[float]) -> Floats:
     return np.divide(over, under, out=np.full_like(over, np.nan), where=under > 0)
 
 
-def _distort(rays: Matrix, model: str, distortion: Sequence[float]) -> Matrix:
+def _distort(rays: Floats, model: str, distortion: Sequence[float]) -> Floats:
     """Apply a model with all its coefficients to rays, ``(n, 2)`` in focal lengths."""
     slope = np.hypot(*rays.T)
     distorted = rays * _growth(slope, model, distortion)[:, None]
@@ -307,7 +307,7 @@ def _plane_of_homography(
     return _flat(plane), lens is not None and bool(is_square), "by a homography"
 
 
-def _plane(turn: Matrix, at: Floats) -> tuple[float, ...]:
+def _plane(turn: Floats, at: Floats) -> tuple[float, ...]:
     """Return `Ground.plane` for a rotation into the camera's axes, and the camera's place."""
     return _flat(np.column_stack([turn[:, 0], turn[:, 1], -turn @ at]))
 
@@ -316,7 +316,7 @@ AHEAD, LEFT = 0, 1
 """Axes of ahead, left and up."""
 
 
-def _rotation(axis: int, degrees: float) -> Matrix:
+def _rotation(axis: int, degrees: float) -> Floats:
     """Return the rotation about an axis of ahead, left and up: about left, ahead goes down."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     turn = np.eye(3)
@@ -326,7 +326,7 @@ def _rotation(axis: int, degrees: float) -> Matrix:
     return turn
 
 
-def _rotation_of(quaternion: Sequence[float]) -> Matrix:
+def _rotation_of(quaternion: Sequence[float]) -> Floats:
     """Return the rotation matrix of a unit quaternion x, y, z, w."""
     x, y, z, w = quaternion
     return np.array(
@@ -338,7 +338,7 @@ def _rotation_of(quaternion: Sequence[float]) -> Matrix:
     )
 
 
-def _apply(matrix: Sequence[float] | Matrix, points: Matrix) -> Matrix:
+def _apply(matrix: Sequence[float] | Floats, points: Floats) -> Floats:
     """Map ``(n, 2)`` points by a 3x3 homography; NaN for points behind the plane."""
     x, y = points.T
     first, second, third = (a * x + b * y + c for a, b, c in np.reshape(matrix, (3, 3)))
@@ -346,9 +346,9 @@ def _apply(matrix: Sequence[float] | Matrix, points: Matrix) -> Matrix:
     return np.stack([first / w, second / w], axis=1)
 
 
-def _inverse(matrix: Sequence[float]) -> Matrix:
+def _inverse(matrix: Sequence[float]) -> Floats:
     return np.linalg.inv(np.reshape(matrix, (3, 3)))
 
 
-def _flat(matrix: Matrix) -> tuple[float, ...]:
+def _flat(matrix: Floats) -> tuple[float, ...]:
     return tuple(np.ravel(matrix).tolist())

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data.arrays import Matrix, Places
+from roadeval.data.arrays import Floats, Places
 from roadeval.geometry.ground import Ground
 
 OUTSIDE: Final = -1
@@ -45,7 +45,7 @@ class Plan:
         return picture
 
 
-def pixels_of(ground: Ground, places: Matrix) -> Places:
+def pixels_of(ground: Ground, places: Floats) -> Places:
     """Return the pixel of each place, ``(n,)`` indices of a flat image, or `OUTSIDE`."""
     pixels = np.rint(ground.pixels(places))
     size = ground.width, ground.height

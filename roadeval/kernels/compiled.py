@@ -15,24 +15,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data.arrays import (
-    Bits,
-    CodeTable,
-    Costs,
-    Distances,
-    Image,
-    Indices,
-    Masks,
-    Matrix,
-    Plane,
-    Planes,
-    Reach,
-    Runs,
-    Sums,
-    Values,
-    Vector,
-    Words,
-)
+from roadeval.data import arrays
+from roadeval.data.arrays import Bits, Floats, Image, Masks, Plane, Planes, Runs, Sums, Values
 from roadeval.kernels import _loops, plain
 
 TABLED: Final = 256
@@ -57,7 +41,7 @@ def _require(array: npt.NDArray[Any], *shape: int) -> None:
         raise ValueError(f"an array of shape {array.shape}, not {shape}")
 
 
-def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
+def look_up_sum_min(planes: Planes, table: Plane) -> tuple[Plane, Sums]:
     _require(table, 766, 256)
     height, width = _shape(*planes)
     codes, histogram = np.empty((height, width), np.uint8), np.empty(256, np.int64)
@@ -67,7 +51,7 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
 
 
 def mahalanobis(
-    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
+    planes: Planes, mean: Floats, whitening: Floats, greatest: float
 ) -> tuple[Values, Plane]:
     _require(mean, 3)
     _require(whitening, 3, 3)
@@ -77,7 +61,7 @@ def mahalanobis(
     return distance, near
 
 
-def look_up_colours(planes: Planes, road: Words) -> Plane:
+def look_up_colours(planes: Planes, road: arrays.Words) -> Plane:
     _require(road, COLOUR_WORDS)
     height, width = _shape(*planes)
     result = np.empty((height, width), np.uint8)
@@ -106,7 +90,7 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
     return sums
 
 
-def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
+def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)
@@ -161,15 +145,15 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return counts
 
 
-def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
+def dilate(bits: Bits, reach: arrays.Reach, width: int) -> Bits:
     return _by_element(_loops.dilate, bits, reach, width)
 
 
-def erode(bits: Bits, reach: Reach, width: int) -> Bits:
+def erode(bits: Bits, reach: arrays.Reach, width: int) -> Bits:
     return _by_element(_loops.erode, bits, reach, width)
 
 
-def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) -> Bits:
+def _by_element(loop: Callable[..., int], bits: Bits, reach: arrays.Reach, width: int) -> Bits:
     _require(bits, len(bits), -(-width // 64))
     if not len(reach):
         raise ValueError("an element without rows")
@@ -180,7 +164,7 @@ def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) 
     return result
 
 
-def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
+def geodesics(cost: arrays.Costs, seeds: Plane, rounds: int) -> arrays.Distances:
     shape = _shape(cost, seeds)
     distance = np.empty(shape, np.int32)
     _loops.geodesics(cost, seeds, *shape, rounds, distance)
@@ -188,7 +172,7 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 
 
 def tree_sum(
-    features: Values, feature: Indices, threshold: Values, leaves: Masks, values: Values
+    features: Values, feature: arrays.Indices, threshold: Values, leaves: Masks, values: Values
 ) -> Values:
     count, pixels = features.shape
     trees, nodes = _shape(feature, threshold, leaves)

@@ -10,27 +10,8 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from roadeval.data import pack, unpack
-from roadeval.data.arrays import (
-    Bits,
-    CodeTable,
-    Costs,
-    Distances,
-    Image,
-    Indices,
-    Labels,
-    Masks,
-    Matrix,
-    Places,
-    Plane,
-    Planes,
-    Reach,
-    Runs,
-    Sums,
-    Values,
-    Vector,
-    Words,
-)
+from roadeval.data import arrays, pack, unpack
+from roadeval.data.arrays import Bits, Floats, Image, Masks, Plane, Planes, Runs, Sums, Values
 
 _AROUND: Final[dict[str, Any]] = {"borderType": cv2.BORDER_CONSTANT, "borderValue": 0}
 """No bit is set around a mask."""
@@ -48,7 +29,7 @@ LEAVES: Final = 32
 # --- Colours of pixels: looked up in tables, and their distance from a mean (Eq. 2) ---------------
 
 
-def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
+def look_up_sum_min(planes: Planes, table: Plane) -> tuple[Plane, Sums]:
     """Look every pixel up by the sum and the minimum of its channels.
 
     ``planes`` are red, green and blue, ``(H, W)`` uint8 each; ``table`` is ``(766, 256)`` uint8,
@@ -60,7 +41,7 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
 
 
 def mahalanobis(
-    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
+    planes: Planes, mean: Floats, whitening: Floats, greatest: float
 ) -> tuple[Values, Plane]:
     """Compute the distance of Eq. 2, ``|W (x - m)|``, of every pixel.
 
@@ -85,7 +66,7 @@ def _squared(planes: Planes, mean: Values, whitening: Values) -> Values:
     return u * u + v * v + w * w
 
 
-def look_up_colours(planes: Planes, road: Words) -> Plane:
+def look_up_colours(planes: Planes, road: arrays.Words) -> Plane:
     """Look every pixel up in a table over all colours, a bit each.
 
     ``planes`` are red, green and blue, ``(H, W)`` uint8 each. ``road`` is ``(2^18,)`` uint64, a
@@ -113,17 +94,17 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return np.array(counts, np.int64).reshape(len(masks), *both.shape[:2])
 
 
-def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
+def dilate(bits: Bits, reach: arrays.Reach, width: int) -> Bits:
     """Dilate a mask of ``width`` pixels a row by an element; nothing around it is set."""
     return pack(cv2.dilate(unpack(bits, width), _element(reach), **_AROUND))
 
 
-def erode(bits: Bits, reach: Reach, width: int) -> Bits:
+def erode(bits: Bits, reach: arrays.Reach, width: int) -> Bits:
     """Erode a mask of ``width`` pixels a row by an element; nothing around it is set."""
     return pack(cv2.erode(unpack(bits, width), _element(reach), **_AROUND))
 
 
-def _element(reach: Reach) -> Plane:
+def _element(reach: arrays.Reach) -> Plane:
     side = 2 * max(len(reach) - 1, int(reach.max())) + 1
     rows, columns = np.abs(np.indices((side, side)) - side // 2)
     inside = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
@@ -157,7 +138,7 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
     return _sums(label, np.dstack(planes).reshape(-1, 3)[pixel], count)
 
 
-def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
+def ring_pairs(labels: arrays.Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     """Return every ``(component, pixel)`` where the pixel lies in the component's ring (Eq. 10).
 
     ``labels`` and ``ring`` are ``(H, W)``, ``width`` is as in `ring_sums`. Pixels are flat indices;
@@ -174,7 +155,7 @@ def ring_pairs(labels: Labels, ring: Plane, width: int) -> tuple[Sums, Sums]:
     return keys // labels.size, keys % labels.size
 
 
-def _sums(labels: Places, colours: Plane, count: int) -> Sums:
+def _sums(labels: arrays.Places, colours: Plane, count: int) -> Sums:
     values = colours.astype(np.float64)
     columns = np.column_stack([np.ones(len(values)), values, values**2]).T
     # Sums of 8-bit values and of their squares stay far below 2^53: float64 adds them exactly.
@@ -182,7 +163,7 @@ def _sums(labels: Places, colours: Plane, count: int) -> Sums:
     return np.stack(sums, axis=1).astype(np.int64)
 
 
-def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
+def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
     """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
 
     ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` are
@@ -199,7 +180,7 @@ def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Mat
 # --- Cheapest paths from some pixels to all others ------------------------------------------------
 
 
-def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
+def geodesics(cost: arrays.Costs, seeds: Plane, rounds: int) -> arrays.Distances:
     """Compute the length of the cheapest path from the seeds to each pixel.
 
     A path goes from neighbour to neighbour, by sides and corners. A step costs the sum of its two
@@ -295,7 +276,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     return label_runs(number[labels]), count - 1
 
 
-def paint(runs: Runs, height: int, width: int) -> Labels:
+def paint(runs: Runs, height: int, width: int) -> arrays.Labels:
     """Return the ``(height, width)`` int32 image of `components`' labels, 0 outside."""
     labels = np.zeros((height, width), np.int32)
     y, x, label = _run_pixels(runs)
@@ -303,7 +284,7 @@ def paint(runs: Runs, height: int, width: int) -> Labels:
     return labels
 
 
-def label_runs(labels: Labels) -> Runs:
+def label_runs(labels: arrays.Labels) -> Runs:
     """Return the runs of equal labels of an ``(H, W)`` int32 image, see `components`."""
     begins = np.ones((labels.shape[0], labels.shape[1] + 1), np.bool_)
     begins[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
@@ -343,7 +324,7 @@ def fill_holes(bits: Bits, width: int) -> Bits:
 
 
 def tree_sum(
-    features: Values, feature: Indices, threshold: Values, leaves: Masks, values: Values
+    features: Values, feature: arrays.Indices, threshold: Values, leaves: Masks, values: Values
 ) -> Values:
     """Compute the sum of decision trees for each pixel, ``(n,)`` float32, in the trees' order.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from heapq import heappushpop
 from itertools import islice
-from typing import Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -479,14 +479,12 @@ class LoggedFrame:
         theirs, resize = label.truth.shape[1::-1], camera.resize_labels
         if problem := size_problem(place, theirs, "its image", sizes[0], resize=resize):
             raise FrameError(problem)
-        truth, classes, codes = label.truth, label.classes, label.probability
-        how = cv2.INTER_NEAREST_EXACT
+        layers = {layer: pixels for layer, pixels in vars(label).items() if pixels is not None}
         for size in sizes:
-            if truth.shape[1::-1] != size:
-                truth = _resized(truth, size, how)
-                classes = None if classes is None else _resized(classes, size, how)
-                codes = None if codes is None else _resized(codes, size, how)
-        return Labels(truth, classes, codes)
+            if layers["truth"].shape[1::-1] != size:
+                for layer, pixels in layers.items():
+                    layers[layer] = _resized(pixels, size, cv2.INTER_NEAREST_EXACT)
+        return Labels(**layers)
 
 
 class FrameStream:
@@ -651,10 +649,7 @@ def merge_streams(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedF
         yield number, next(streams[number])
 
 
-Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
-
-
-def _resized(pixels: Pixels, size: tuple[int, int], how: int) -> Pixels:
+def _resized(pixels: npt.NDArray[Any], size: tuple[int, int], how: int) -> npt.NDArray[Any]:
     """Resize an image, or labels, to a width and height."""
     import cv2
 

@@ -241,11 +241,8 @@ def check_arrays(
         lengths = dict(zip(shape, array.shape, strict=False)) | lengths  # the first one holds
         expected = [side if isinstance(side, int) else lengths.get(side) for side in shape]
         if [*array.shape] != expected or not array.size:
-            actual, there = (
-                f"({', '.join(map(str, sides))}{',' * (len(sides) == 1)})"
-                for sides in (array.shape, shape)
-            )
-            raise ValueError(f"{name} has the shape {actual} instead of {there}")
+            there = str(shape).replace("'", "")
+            raise ValueError(f"{name} has the shape {array.shape} instead of {there}")
         if array.dtype != dtype if shape else array.dtype.kind not in "iuf":
             raise ValueError(f"{name} is of type {array.dtype} instead of {np.dtype(dtype)}")
         check_range(name, array, -GREATEST, GREATEST)

@@ -15,8 +15,7 @@ A reduced image has the means of blocks of pixels, of two by two or of so many t
 `COLUMNS` columns are left: it is there to be looked at, and a map of 1920x1200 pixels takes twice
 the bytes of the camera's JPEG. An image is large if it has more than twice as many columns.
 
-A codec's ``style`` is logged once: colours, class names and ranges, the same on all frames. Only
-``style`` and ``columns`` import Rerun: decoding does not need it.
+Only ``columns`` imports Rerun: decoding does not need it.
 
 A label image has 1, 2, 4 or 8 bits a pixel: the value of a pixel is its index, the palette only
 colours it. A binary mask of a real frame takes a quarter of the size of its raw bytes after LZ4.
@@ -86,7 +85,7 @@ _CAMERA: Final = LayerSpec("camera", LayerKind.RGB, "Camera")
 
 @dataclass(frozen=True)
 class Codec:
-    """Encodes and decodes images of one kind, and describes to the viewer how to show them.
+    """Encodes and decodes images of one kind.
 
     This class itself is for the camera's images, JPEG or PNG as the log has them.
     """
@@ -96,12 +95,6 @@ class Codec:
     spec: LayerSpec = _CAMERA
     component: ClassVar = "EncodedImage:blob"
     """The archetype and its component that hold the bytes."""
-
-    def style(self) -> Sequence[Any]:
-        """Return the archetypes that are logged once: the image is drawn below every mask."""
-        import rerun as rr
-
-        return [rr.EncodedImage.from_fields(draw_order=-10)]
 
     def encode(self, array: Any) -> bytes:
         """Return the bytes of a frame's array, here of ``(H, W, 3)`` uint8 RGB as a JPEG file."""
@@ -134,7 +127,7 @@ class ImageCodec(Codec):
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
-        return _restore(super().decode(payload), self.width, self.height)
+        return np.asarray(cv2.resize(super().decode(payload), (self.width, self.height)))
 
 
 class MaskCodec(Codec):
@@ -147,12 +140,6 @@ class MaskCodec(Codec):
         for place, label in enumerate(self.spec.classes):
             places[label.value], values[place] = place, label.value
         return places, values
-
-    def style(self) -> Sequence[Any]:
-        """Return the archetype of a mask: it is drawn above the camera's image."""
-        import rerun as rr
-
-        return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
 
     def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
         """Return a PNG file of ``(H, W)`` uint8 class values, or of the bits of two classes."""
@@ -171,20 +158,6 @@ class LabelCodec(Codec):
 
     component = "SegmentationImage:buffer"
 
-    def style(self) -> Sequence[Any]:
-        """Return the classes' names and colours, and every frame's format."""
-        import rerun as rr
-
-        classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in self.spec.classes]
-        size, kind = (self.width, self.height), rr.ChannelDatatype.U8
-        pixels = rr.components.ImageFormat(
-            *size, color_model=rr.ColorModel.L, channel_datatype=kind
-        )
-        return [
-            rr.AnnotationContext(classes),
-            rr.SegmentationImage.from_fields(format=pixels, opacity=1.0, draw_order=10),
-        ]
-
     def encode(self, array: Array) -> bytes:
         """Return the bytes of ``(H, W)`` uint8."""
         return array.tobytes()
@@ -198,19 +171,6 @@ class ScalarCodec(Codec):
     """A map of numbers: a grey PNG whose levels span the range, coloured by the viewer."""
 
     component = "EncodedDepthImage:blob"
-
-    def style(self) -> Sequence[Any]:
-        """Return the colour map; the viewer takes grey levels for fractions, in any unit."""
-        import rerun as rr
-
-        return [
-            rr.EncodedDepthImage.from_fields(
-                media_type="image/png",
-                meter=1.0,
-                depth_range=(0.0, 1.0),
-                colormap=rr.components.Colormap.Viridis,
-            )
-        ]
 
     def encode(self, array: Array) -> bytes:
         """Return a PNG file of ``(H, W)`` float32, or of uint8 codes that span the range."""
@@ -229,7 +189,7 @@ class ScalarCodec(Codec):
         codes = to_labels(payload, limits_for(self.width, self.height))
         low, high = self.spec.value_range
         values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
-        return _restore(values, self.width, self.height)
+        return np.asarray(cv2.resize(values, (self.width, self.height)))
 
 
 def _reduce(array: Array) -> Array:
@@ -237,10 +197,6 @@ def _reduce(array: Array) -> Array:
     block = max(2, -(-width // COLUMNS))
     size = -(-width // block), -(-height // block)
     return cv2.resize(array, size, interpolation=cv2.INTER_AREA)
-
-
-def _restore(array: Array, width: int, height: int) -> Array:
-    return array if array.shape[:2] == (height, width) else cv2.resize(array, (width, height))
 
 
 def _jpeg(rgb: Array) -> bytes:
@@ -298,15 +254,9 @@ def _file(
     shape: tuple[int, int], bits: int, kind: int, chunks: Sequence[bytes], lines: Bytes
 ) -> bytes:
     height, width = shape
-    return b"".join(
-        (
-            _SIGNATURE,
-            _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0)),
-            *chunks,
-            _chunk(b"IDAT", compress(lines)),
-            _chunk(b"IEND", b""),
-        )
-    )
+    head = _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0))
+    pixels = _chunk(b"IDAT", compress(lines))
+    return b"".join((_SIGNATURE, head, *chunks, pixels, _chunk(b"IEND", b"")))
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:

@@ -253,10 +253,8 @@ class RecordRule:
         """Return the rule that a text states; a `RecordingError` if it states none."""
         match = _RULE.fullmatch(text)
         if match is None:
-            raise RecordingError(
-                f"there is no choice {text}",
-                setting="output.record",
-                remedy="choose all, masks, worst:K, every:N or none (as worst:20)",
-            )
+            problem = f"there is no choice {text}"
+            remedy = "choose all, masks, worst:K, every:N or none (as worst:20)"
+            raise RecordingError(problem, setting="output.record", remedy=remedy)
         plain, counted, number = match.groups()
         return cls(plain or counted, int(number or 0))

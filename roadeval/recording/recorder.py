@@ -22,15 +22,7 @@ from typing import Any, Final, NamedTuple, Self
 
 import rerun as rr
 
-from roadeval.data import (
-    ERRORS,
-    FINAL_STAGE,
-    IGNORE,
-    TRUTH,
-    FrameResult,
-    Health,
-    LayerKind,
-)
+from roadeval.data import ERRORS, FINAL_STAGE, IGNORE, TRUTH, FrameResult, Health, LayerKind
 from roadeval.data.arrays import IGNORED
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT, TESTED
@@ -396,13 +388,10 @@ class Recorder:
             return Sentence(fitting, self._rule.number, memory)
         sentence = f"the recording will take about {size / 1e6:.0f} MB"
         if size > room:
-            free = f"{(room + LEAST_FREE) / 1e6:.0f} MB are free"
-            return Sentence(
-                "{}, and only {}: {output.record} masks or worst:50 takes less, or {output.save} "
-                "names a place on another disk",
-                sentence,
-                free,
-            )
+            problem = f"{sentence}, and only {(room + LEAST_FREE) / 1e6:.0f} MB are free"
+            less = Sentence("{output.record} masks or worst:50 takes less")
+            elsewhere = Sentence("{output.save} names a place on another disk")
+            return Sentence("{}: {}, or {}", problem, less, elsewhere)
         return sentence if size > WORTH_SAYING else ""
 
     def _write_worst(self) -> None:
@@ -461,10 +450,8 @@ class Recorder:
     def check_disk_space(self) -> None:
         """Raise a `RecordingError`, caused by an ENOSPC, if the disk is full or nearly full."""
         if self._room() < self._rows.size:
-            raise RecordingError(
-                f"cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must stay free)",
-                where=self.path,
-            ) from _failure(errno.ENOSPC)
+            problem = f"cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must stay free)"
+            raise RecordingError(problem, where=self.path) from _failure(errno.ENOSPC)
 
     def _room(self) -> float:
         """Return the free bytes beside `LEAST_FREE`; infinity where no disk is, as in /proc."""
@@ -569,9 +556,8 @@ class Recorder:
 
     def _incomplete(self) -> RecordingError:
         refusal = self._refusal() or _failure(errno.EIO)
-        error = RecordingError(
-            f"cannot be written any further: {refusal.strerror}", where=self.path
-        )
+        problem = f"cannot be written any further: {refusal.strerror}"
+        error = RecordingError(problem, where=self.path)
         error.__cause__ = refusal
         return error
 

@@ -104,12 +104,9 @@ class Recording:
             with name_damage(self.path, at.SHOWN):
                 shown = {int(frame): int(stamp) for frame, stamp in json.loads(listed)}
             if not all(map(self._file.span(at.CAMERA).holds, shown)):
-                raise RecordingError(
-                    "lacks images of frames that it lists: it is a part, as `rerun rrd split` "
-                    "makes it",
-                    where=self.path,
-                    remedy="give the whole recording",
-                )
+                part = "it is a part, as `rerun rrd split` makes it"
+                problem = f"lacks images of frames that it lists: {part}"
+                raise RecordingError(problem, where=self.path, remedy="give the whole recording")
             return shown
         stamps: dict[int, int] = {}
         for batch in self._file.batches(at.CAMERA, _CAMERA, static=False):
@@ -215,10 +212,8 @@ class Recording:
 
     def _array(self, path: str, frame: int) -> Cells:
         if path not in self._codecs:
-            paths = ", ".join(sorted(self._codecs))
-            raise RecordingError(
-                f"there is no {path}", where=self.path, remedy=f"there are {paths}"
-            )
+            remedy = f"there are {', '.join(sorted(self._codecs))}"
+            raise RecordingError(f"there is no {path}", where=self.path, remedy=remedy)
         codec = self._codecs[path]
         with name_damage(self.path, f"{path} on frame {frame}"):
             payload = self._file.image(path, codec.component, frame)

@@ -101,11 +101,8 @@ class RrdFile:
         messages, self.indexed = _find_messages(path)
         framed = [message for message in messages if message.span]
         if len(framed) < len(messages) and all(message.span == ALWAYS for message in framed):
-            raise RecordingError(
-                f"its timeline {FRAME} was dropped",
-                where=path,
-                remedy="give the recording as it was made",
-            )
+            remedy = "give the recording as it was made"
+            raise RecordingError(f"its timeline {FRAME} was dropped", where=path, remedy=remedy)
         for message in sorted(framed, key=attrgetter("span.first", "offset")):
             self.messages[message.path].append(message)
 
@@ -243,11 +240,8 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
         check_input(path)
         with path.open("rb") as file, name_damage(path, "its index"):
             if file.read(len(_MAGIC)) != _MAGIC:
-                raise RecordingError(
-                    "not a recording (.rrd)",
-                    where=path,
-                    remedy="'roadeval replay' makes one of a log",
-                )
+                remedy = "'roadeval replay' makes one of a log"
+                raise RecordingError("not a recording (.rrd)", where=path, remedy=remedy)
             indexed_stores = _read_index(file)
             stores = _scan(file) if indexed_stores is None else indexed_stores
             recordings = defaultdict[bytes, list[StoredMessage]](list)
@@ -272,11 +266,8 @@ def _find_messages(path: Path) -> tuple[list[StoredMessage], bool]:
     runs = [store for store, paths in layouts.items() if paths]
     count = sum(max(layouts[store].values()) for store in runs)
     if count > 1:
-        raise RecordingError(
-            f"holds {count} recordings, or parts of one, as `rerun rrd merge` joins them",
-            where=path,
-            remedy="give them one by one",
-        )
+        problem = f"holds {count} recordings, or parts of one, as `rerun rrd merge` joins them"
+        raise RecordingError(problem, where=path, remedy="give them one by one")
     return recordings[(runs or [*recordings])[0]], indexed_stores is not None
 
 

@@ -140,9 +140,8 @@ def ask(request: Callable[[], Answer]) -> Answer:
             return request()
         except TimeoutError as error:
             if time.monotonic() > deadline:
-                raise RecordingError(
-                    f"the viewer did not answer within {LOADING_S:.0f} s"
-                ) from error
+                problem = f"the viewer did not answer within {LOADING_S:.0f} s"
+                raise RecordingError(problem) from error
         except (OSError, RuntimeError) as error:
             raise RecordingError(f"the viewer has ended: {error}") from error
 

@@ -265,14 +265,11 @@ def _curves(layout: Layout) -> list[BlueprintPart]:
         return [stage_times(variant) for variant in layout.shown[:_ROWS]]
     finals = [f"{variant.name}/{variant.stages[-1]}" for variant in layout.variants]
     finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
-    return [
-        plot(
-            f"{rate}, %: {SHORT[rate].in_words}",
-            [f"{at.PERCENT}/{final}/{rate}" for final in finals],
-        )
-        for rate in SHORT
-        if rate in layout.rates
-    ]
+    curves = []
+    for rate in (rate for rate in SHORT if rate in layout.rates):
+        paths = [f"{at.PERCENT}/{final}/{rate}" for final in finals]
+        curves.append(plot(f"{rate}, %: {SHORT[rate].in_words}", paths))
+    return curves
 
 
 def picture(title: str, *paths: str) -> BlueprintPart:
@@ -395,7 +392,7 @@ def before_the_first_frame(
 ) -> StaticData:
     """Yield the static data that a recording begins with; ``camera`` is its short name in a rig."""
     for path, codec in codecs.items():
-        yield path, list(codec.style())
+        yield path, _style(codec)
     if layout.calibration:
         yield at.CAMERA, list(_lens(layout.calibration))
     if layout.ground:
@@ -411,6 +408,30 @@ def before_the_first_frame(
         colours = [_STATES[state] for state in states]
         yield path, [rr.StateConfiguration(values=states, colors=colours)]
     yield from _lines(layout, f"{camera} " if camera else "")
+
+
+def _style(codec: Codec) -> list[Any]:
+    """Return how the viewer shows a kind of image: masks lie over the camera's image."""
+    match codec.spec.kind:
+        case LayerKind.MASK:
+            return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
+        case LayerKind.LABELS:
+            classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in codec.spec.classes]
+            size, byte = (codec.width, codec.height), rr.ChannelDatatype.U8
+            pixels = rr.components.ImageFormat(
+                *size, color_model=rr.ColorModel.L, channel_datatype=byte
+            )
+            labels = rr.SegmentationImage.from_fields(format=pixels, opacity=1.0, draw_order=10)
+            return [rr.AnnotationContext(classes), labels]
+        case LayerKind.SCALAR:  # the viewer takes grey levels for fractions, in any unit
+            viridis = rr.components.Colormap.Viridis
+            return [
+                rr.EncodedDepthImage.from_fields(
+                    media_type="image/png", meter=1.0, depth_range=(0.0, 1.0), colormap=viridis
+                )
+            ]
+        case LayerKind.RGB:
+            return [rr.EncodedImage.from_fields(draw_order=-10)]
 
 
 def _lens(calibration: Calibration) -> Iterator[Any]:
@@ -493,9 +514,8 @@ def after_a_rig(texts: Mapping[str, str]) -> StaticData:
 
 def _rig_guide(drive: str, cameras: Iterable[str], verdict: str = "") -> tuple[str, list[Any]]:
     names = f"**Cameras:** {as_markdown(', '.join(cameras))}"
-    return _guide(
-        drive, verdict, names, "", _ERRORS, "**Tabs:** one for each camera.", "", _HANDLING
-    )
+    tabs = "**Tabs:** one for each camera."
+    return _guide(drive, verdict, names, "", _ERRORS, tabs, "", _HANDLING)
 
 
 def _lines(layout: Layout, camera: str) -> StaticData:

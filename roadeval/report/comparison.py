@@ -9,37 +9,23 @@ from operator import attrgetter
 from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
-from roadeval.evaluation.comparison.compare import (
-    ClassChange,
-    ComparedResult,
-    Comparison,
-    DriveChange,
-    MaskChange,
-    RegionChange,
-)
+from roadeval.evaluation.comparison import compare
+from roadeval.evaluation.comparison.compare import Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.comparison.pairing import MovedFrame
 from roadeval.evaluation.metrics import SHORT, TESTED
-from roadeval.report.blocks import (
-    Block,
-    BulletList,
-    Cell,
-    Figure,
-    Heading,
-    Report,
-    Table,
-    Text,
-    blocks_as_markdown,
-)
+from roadeval.report import blocks
+from roadeval.report.blocks import Block, BulletList, Cell, Heading, Table, Text
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart
 from roadeval.report.charts import standard as charts
 from roadeval.report.comment import MOST, changes, fit, in_code, levels, standing
+from roadeval.report.tables import breaks_of
 from roadeval.results import comparison as sentences
 from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
-Row = MaskChange | MovedFrame | RegionChange | DriveChange | ClassChange
+Row = MaskChange | MovedFrame | compare.RegionChange | compare.DriveChange | compare.ClassChange
 """A fact on a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
 """The function that makes a row's cell in each column, by the columns' titles."""
@@ -58,7 +44,7 @@ def document(
     judgements: Sequence[Judgement],
     over_drive: Sequence[Chart],
     inspect: Inspect | None = None,
-) -> Report:
+) -> blocks.Report:
     """Return a comparison as a document.
 
     ``judgements`` judge the limits of the command, ``over_drive`` are charts of the masks' rates
@@ -66,7 +52,7 @@ def document(
     the result's label; None: no commands.
     """
     labels = [result.label for result in comparison.results]
-    return Report(
+    return blocks.Report(
         kicker="roadeval comparison",
         title=listing(labels),
         subtitle="; ".join(map(_subtitle, comparison.results)),
@@ -84,12 +70,12 @@ def document(
 
 def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
-    blocks = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
+    parts = [*overview(comparison, judgements), *_warnings(comparison), *_details(comparison)]
     title = "roadeval comparison"
     if judgements:
         exceeded = [judgement.holds for judgement in judgements]
         title = f"roadeval: {sentences.headline(exceeded)}"
-    return f"# {title}\n\n{blocks_as_markdown(blocks)}"
+    return f"# {title}\n\n{blocks.blocks_as_markdown(parts)}"
 
 
 def comment(
@@ -132,7 +118,7 @@ def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> lis
     return [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
 
 
-def _subtitle(result: ComparedResult) -> str:
+def _subtitle(result: compare.ComparedResult) -> str:
     """Return the frames or drives of a result in words."""
     if result.drive is not None:
         return f"{result.label}: {result.frames} frames of {result.drive}"
@@ -181,28 +167,20 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
         drives = max(row.drives for row in rows)
         over = f": {drives} drives in common" if drives > 1 else ""
         lines: list[list[Cell | str]] = []
-        breaks = []
         for variant, of_variant in groupby(rows, attrgetter("variant")):
-            breaks.append(len(lines))
             for place, row in enumerate(of_variant):
                 for rate in SHORT if row.final else [TESTED]:
                     first, change = rate == TESTED, row.difference[rate]
+                    mask = variant if first and place == 0 else "", row.stage if first else ""
+                    rates = percent(row.base[rate]), percent(row.new[rate])
                     lines.append(
-                        [
-                            variant if first and place == 0 else "",
-                            row.stage if first else "",
-                            rate,
-                            percent(row.base[rate]),
-                            percent(row.new[rate]),
-                            points(change.mean),
-                            marked_interval(change),
-                        ]
+                        [*mask, rate, *rates, points(change.mean), marked_interval(change)]
                     )
         yield Table(
             ["variant", "stage", "rate", *CHANGE],
             lines,
             text_columns=(0, 1, 2),
-            breaks=breaks[1:],
+            breaks=breaks_of(lines),
             caption=f"{result} against {base}{over}".strip(),
             small=True,
         )
@@ -241,10 +219,10 @@ def _table(rows: Sequence[Row], columns: Columns, legend: str = "") -> Table:
 def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Block]:
     finals = [row for row in _changed(comparison) if row.final]
     if finals:
-        yield Figure(charts.changes(finals), caption("change of rates"))
+        yield blocks.Figure(charts.changes(finals), caption("change of rates"))
     if over_drive:
         yield Heading("Over the drive", 2)
-        yield Figure(over_drive, caption("common frames", rate=TESTED))
+        yield blocks.Figure(over_drive, caption("common frames", rate=TESTED))
 
 
 def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator[Block]:

@@ -99,8 +99,6 @@ def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
 def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
     preset = findings.facts.run.get("preset")
     ran = findings.facts.finals if isinstance(findings, FleetFolder) else findings.facts.settings
-    if {FILTERED, UNFILTERED}.isdisjoint(ran):  # the preset's chain did not run
-        preset = None
     if isinstance(findings, FleetFolder):
         version = findings.facts.version
         yield f"{number(len(findings.facts.drives))} drives"
@@ -115,8 +113,7 @@ def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
             yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
         if facts.drive.rate_hz:
             yield f"{facts.drive.rate_hz:.4g} Hz"
-    variants = getattr(findings.facts, "settings", findings.facts.finals)
-    if preset and {FILTERED, UNFILTERED, preset} & {*variants}:  # else it has not run
+    if preset and {FILTERED, UNFILTERED} & {*ran}:  # else its chain did not run
         yield f"preset {preset}"
     if version:
         yield f"roadeval {version}"

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from roadeval.data.words import MINUS
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
@@ -62,10 +63,7 @@ def ticks(span: AxisRange, count: int) -> list[float]:
 
 def _number_ticks(span: AxisRange) -> list[Tick]:
     """Return ticks at round numbers."""
-    return [
-        (span.percent(tick), f"{tick:g}".replace("-", "\N{MINUS SIGN}"))
-        for tick in ticks(span, _Y_TICKS)
-    ]
+    return [(span.percent(tick), f"{tick:g}".replace("-", MINUS)) for tick in ticks(span, _Y_TICKS)]
 
 
 def _with_room(span: AxisRange) -> AxisRange:

@@ -152,8 +152,6 @@ _DASHES: Final = {
 _MARKS: Final = {"circle": "o", "square": "s", "triangle": "^", "diamond": "D", "cross": "x"}
 _LONGEST: Final = 80
 """Letters of a variant's name that fit in a line of the legend."""
-
-
 ERROR_RATE: Final = "fig3a_error_rate"
 FP_FN_RATE: Final = "fig3b_fp_fn_rate"
 OVER_DRIVE: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {

@@ -31,9 +31,8 @@ PROBABILITY: Final = "{}: probability"
 FPS: Final = 10
 NO_MASK: Final = 128
 """The shade of ignored pixels, and of a mask that a frame does not have."""
-_WIDTHS: Final = {4: 480, 9: 400}
-_NARROW: Final = 320
-"""Most pixels across a panel, by the number of panels, and of more panels."""
+_WIDTHS: Final = {4: 480, 9: 400, math.inf: 320}
+"""Most pixels across a panel, for at most so many panels."""
 _KEYFRAMES: Final = 10
 """Frames from one keyframe to the next: a seek decodes at most so many."""
 _CODECS: Final = {"webm": "libvpx-vp9", "mp4": "libx264", "gif": "gif"}
@@ -80,7 +79,7 @@ def make_film(
     uint8 shades; a panel that it leaves out is grey. All frames have the size of the first one.
     """
     first = read(frames[0])[CAMERA]
-    most = next((width for count, width in _WIDTHS.items() if len(panels) <= count), _NARROW)
+    most = next(width for count, width in _WIDTHS.items() if len(panels) <= count)
     width = max(min(first.shape[1], most) // 2 * 2, 2)
     height = max(round(first.shape[0] * width / first.shape[1] / 2) * 2, 2)
     columns = math.ceil(math.sqrt(len(panels)))

@@ -14,19 +14,8 @@ from roadeval.data.words import DASH, counted, number, percent, points
 from roadeval.evaluation.comparison.history import Line
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
-from roadeval.report.blocks import (
-    Block,
-    BulletList,
-    Cell,
-    Command,
-    Details,
-    Figure,
-    Heading,
-    Report,
-    Table,
-    Text,
-    blocks_as_markdown,
-)
+from roadeval.report import blocks
+from roadeval.report.blocks import Block, BulletList, Cell, Details, Heading, Table, Text
 from roadeval.report.captions import note
 from roadeval.report.chart import FAINT, WORSE, Chart, ChartKind, Look, Series, looks
 from roadeval.report.comparison import limits
@@ -41,11 +30,11 @@ ROWS: Final = 10
 Rows = list[list[Cell | str]]
 
 
-def document(history: History) -> Report:
+def document(history: History) -> blocks.Report:
     """Return a history as a document."""
     runs = history.runs
     lost = [BulletList("Left out", history.lost, "warning")] if history.lost else []
-    return Report(
+    return blocks.Report(
         kicker="roadeval history",
         title=f"{counted(len(runs), 'run')}: {history.focus}",
         subtitle=f"{runs[0].title} to {runs[-1].title}, {counted(runs[-1].drives, 'drive')} last",
@@ -75,14 +64,12 @@ def markdown(history: History) -> str:
         [Heading(block.title, 2), *block.blocks] if isinstance(block, Details) else [block]
         for block in document(history).blocks
     )
-    return f"# roadeval history\n\n{blocks_as_markdown(chain.from_iterable(opened))}"
+    return f"# roadeval history\n\n{blocks.blocks_as_markdown(chain.from_iterable(opened))}"
 
 
 def rates_table(lines: Sequence[Line]) -> Table:
     """Tabulate lines: their rates in the first and the last run, and their levels between."""
-    rows: Rows = [
-        [line.variant, line.title, *_over_runs(line.rates, line.levels)] for line in lines
-    ]
+    rows = [[line.variant, line.title, *_over_runs(line.rates, line.levels)] for line in lines]
     columns = ["variant", "rate", "first %", "last %", "over the runs"]
     breaks = [n for n, row in enumerate(rows) if n and row[0] != rows[n - 1][0]]
     return Table(columns, rows, text_columns=(0, 1, 4), breaks=breaks, small=True)
@@ -109,13 +96,13 @@ def _figures(history: History) -> Iterator[Block]:
     """Yield charts of the levels: of all pixels, then of what moved most."""
     masks = [line for line in history.lines if line.kind == ALL]
     by_rate = {rate: [m for m in masks if m.rate == rate] for rate in (m.rate for m in masks)}
-    yield Figure([_chart(history, rate, lines) for rate, lines in by_rate.items()], "")
+    yield blocks.Figure([_chart(history, rate, lines) for rate, lines in by_rate.items()], "")
     yield note("levels")
     parts = [m for m in history.lines if m.kind != ALL and m.variant == history.focus and m.steps]
     parts.sort(key=lambda line: float(np.nanmin(line.levels) - np.nanmax(line.levels)))
     if parts:
         yield Heading(f"Where {history.focus} changed most", 2)
-        yield Figure([_chart(history, line.title, [line]) for line in parts[:ROWS]], "")
+        yield blocks.Figure([_chart(history, line.title, [line]) for line in parts[:ROWS]], "")
 
 
 def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
@@ -136,13 +123,13 @@ def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
 def _details(history: History, event: Event) -> Details:
     """Return what an event changed, what else differs there, and the drives that carry it."""
     first, run = event.first, history.runs[event.run]
-    blocks: list[Block] = [BulletList("What changed there", event.reasons)] if event.reasons else []
+    parts: list[Block] = [BulletList("What changed there", event.reasons)]
     changes: Rows = [
         [c.line.variant, c.line.title, points(c.difference.mean), marked_interval(c.difference)]
         for c in event.changes
     ]
     columns = ["variant", "rate", "change", "interval"]
-    blocks.append(Table(columns, changes, text_columns=(0, 1), small=True))
+    parts.append(Table(columns, changes, text_columns=(0, 1), small=True))
     carrying = first.drives[first.drives["mean"] != 0].head(ROWS)
     drives: Rows = [
         [row["drive"], percent(row["before"]), percent(row["after"]), points(row["mean"])]
@@ -150,32 +137,26 @@ def _details(history: History, event: Event) -> Details:
     ]
     title = f"{first.line.title} of the drives that changed most"
     columns = ["drive", "before %", "after %", "change"]
-    blocks.append(Table(columns, drives, caption=title, small=True))
+    parts.append(Table(columns, drives, caption=title, small=True))
     if event.frames:
-        frames: Rows = [
-            [drive, str(frame), points(change)] for drive, frame, change in event.frames
-        ]
+        frames: Rows = [[drive, str(n), points(change)] for drive, n, change in event.frames]
         title = "Frames that changed most"
-        blocks.append(Table(["drive", "frame", "change of ERR"], frames, caption=title, small=True))
+        parts.append(Table(["drive", "frame", "change of ERR"], frames, caption=title, small=True))
     paths = [history.runs[place].paths[0] for place in (event.run - 1, event.run)]
-    blocks.append(Command(shlex.join(["roadeval", "compare", *paths])))
-    return Details(f"{run.name}: {describe_change(first)}", blocks)
+    parts.append(blocks.Command(shlex.join(["roadeval", "compare", *paths])))
+    return Details(f"{run.name}: {describe_change(first)}", parts)
 
 
 def _drives_table(history: History) -> Details:
     """Return the error rate of the focus on each drive, run by run."""
+    import pandas as pd
+
     rows: Rows = []
-    lines = (
-        m for m in history.lines if (m.variant, m.kind, m.rate) == (history.focus, ALL, TESTED)
-    )
-    for line in lines:
-        for drive, places in line.drives.reset_index(drop=True).groupby("drive").groups.items():
-            rates = line.drive_rates[:, places]
-            there = ~np.isnan(rates)
-            means = np.where(there, rates, 0).sum(axis=1) / np.where(
-                there.any(1), there.sum(1), np.nan
-            )
-            rows.append([str(drive), *_over_runs(means, means)])
+    for line in history.lines:
+        if (line.variant, line.kind, line.rate) == (history.focus, ALL, TESTED):
+            by_drive = pd.DataFrame(line.drive_rates.T).groupby(line.drives["drive"].to_numpy())
+            for drive, rates in by_drive.mean().iterrows():
+                rows.append([str(drive), *_over_runs(rates.to_numpy(), rates.to_numpy())])
     columns = ["drive", "first %", "last %", "over the runs"]
     table = Table(columns, rows, text_columns=(0, 3), small=True, find="Find drives:")
     return Details(f"{TESTED} of {history.focus} on each drive", [table], on_paper=False)

@@ -159,9 +159,7 @@ def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
     ``colour`` is half-way between; NaN is grey.
     """
     levels = np.nan_to_num(shares / (top or 1.0))[..., None]
-    white, middle, darkest = (
-        np.array(shade, float) for shade in ((255, 255, 255), colour, colours.MOST_ERRORS)
-    )
+    white, middle, darkest = np.array([(255, 255, 255), colour, colours.MOST_ERRORS], float)
     light, dark = np.minimum(2 * levels, 1), np.maximum(2 * levels - 1, 0)
     cells = white + light * (middle - white) + dark * (darkest - middle)
     cells[np.isnan(shares)] = colours.NEVER_LABELLED

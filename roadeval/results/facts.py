@@ -374,16 +374,8 @@ class Facts(FactsFile):
     )
     OPTIONAL = (
         *("against_method", "curves", "thresholds", "methods", "masks", "files", "kitti"),
-        *(
-            "cameras",
-            "unlabelled",
-            "estimate",
-            "misfits",
-            "disturbances",
-            "slices",
-            "why",
-            "origin",
-        ),
+        *("cameras", "unlabelled", "estimate", "misfits", "disturbances", "slices", "why"),
+        "origin",
     )
 
     def content(self) -> dict[str, Any]:
@@ -501,9 +493,7 @@ class FleetFacts(FactsFile):
     AGAIN = AGAIN
     RESULTS = (
         *("verdict", "counts", "frames", "totals", "effects", "strata", "warnings", "misfits"),
-        "disturbances",
-        "slices",
-        "why",
+        *("disturbances", "slices", "why"),
     )
     OPTIONAL = ("misfits", "disturbances", "slices", "why", "origin")
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import shlex
 import shutil
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -326,14 +326,13 @@ def cache(folder: Path, drive: str) -> None:
     key = Key(drive, visible(results.facts.drive.camera))
     frames, regions = (of_drive(results, name, drive) for name in ("frames", "regions"))
     frames = frames.assign(final=is_final(frames))
+    of_focus = only(frames, final=True, variant=results.facts.focus)
     rows = {
         "frames": frames,
         "regions": tables.finals(regions),
         "classes": of_drive(results, "classes", drive),
         "scores": table_of_scores(frames, regions, beyond_masks(results.facts, key)),
-        "worst": _frames_with_pictures(
-            folder, drive, only(frames, final=True, variant=results.facts.focus)
-        ).assign(rank=0),
+        "worst": _frames_with_pictures(folder, drive, of_focus).assign(rank=0),
     }
     write_parquet({files[name]: (name, rows[name]) for name in CACHED}, summary)
 
@@ -369,11 +368,7 @@ class FleetWriter:
                 with suppress(ValueError):  # damage: it is written again
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
-            elif (
-                not (self.folder / RESULTS).is_dir()
-                and self.folder.is_dir()
-                and any(self.folder.iterdir())
-            ):
+            elif not (self.folder / RESULTS).is_dir() and any(self.folder.glob("*")):
                 raise ResultsError(
                     f"{self.folder}: holds other files and is no fleet's folder; name a new one"
                 )
@@ -421,8 +416,7 @@ class FleetWriter:
         just one was scored; and the disturbances of each drive that has any.
         """
         tags = sorted({key for member in members for key in member.tags})
-        rows: dict[str, list[Any]] = {"drives": [], "effects": [], "within": [], "cached": []}
-        rows["disturbed"] = []
+        rows = defaultdict[str, list[Any]](list)
         for member in members:
             self._add(member, self._read_made(member.drive, digests), rows)
         try:

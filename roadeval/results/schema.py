@@ -128,6 +128,7 @@ _RATES: Final = {
     name: Column(name, Kind.RATE, f"{metric.title}, {metric.formula}", metric.unit)
     for name, metric in METRICS.items()
 }
+_COUNTS_AND_RATES: Final = (*_COUNTS, *_RATES.values())
 _DOUBTS: Final = tuple(Column(sign, Kind.RATE, words) for sign, words in SIGNS.items())
 _QUANTITIES: Final = tuple(Column(name, Kind.NUMBER, doc) for name, doc in QUANTITIES.items())
 _MEANS: Final = (
@@ -146,8 +147,7 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         _STAMP,
         Column("log_time_ns", Kind.TIME, "time at which the recorder logged it"),
         *_MASK,
-        *_COUNTS,
-        *_RATES.values(),
+        *_COUNTS_AND_RATES,
         Column("truth", Kind.COUNT, "checksum of the truth's pixels, of all masks of the frame"),
     ),
     "regions": (
@@ -161,8 +161,7 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         _VARIANT,
         Column("oracle", Kind.NAME, "the stage that is replaced"),
         _STAGE,
-        *_COUNTS,
-        *_RATES.values(),
+        *_COUNTS_AND_RATES,
     ),
     "disturbances": (
         *_IN_FRAME,
@@ -170,8 +169,7 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         Column("kind", Kind.NAME, "the kind of the disturbance"),
         Column("strength", Kind.NUMBER, "its strength; of `jpeg` the quality"),
         *_MASK,
-        *_COUNTS,
-        *_RATES.values(),
+        *_COUNTS_AND_RATES,
     ),
     "disagreements": (
         *_IN_FRAME,
@@ -334,9 +332,7 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         *_IN_FRAME,
         _STAMP,
         *_MASK,
-        _RATES["ERR"],
-        _RATES["FNR"],
-        _RATES["FPR"],
+        *(_RATES[name] for name in ("ERR", "FNR", "FPR")),
         Column("picture", Kind.TEXT, "picture of the errors: a file in the fleet's folder"),
     ),
 }

@@ -25,8 +25,6 @@ OVERCONFIDENT: Final = 0.01
 
 Rates = Mapping[str, Any]
 """Rates of a mask by their names."""
-
-
 _WHY: Final = {
     "trained on": "to train on",
     "equal to a training frame": "equal to one of them",

@@ -161,11 +161,8 @@ def describe_slice(failure: Slice) -> str:
 def describe_place(failure: Slice) -> str:
     """Return which frames, and which part of them, a slice is."""
     conditions = " and ".join(map(describe_condition, failure.conditions))
-    parts = [
-        f"in frames {conditions}" * bool(conditions),
-        failure.part and describe_part(failure.part),
-    ]
-    return ", ".join(filter(None, parts))
+    frames = f"in frames {conditions}" * bool(conditions)
+    return ", ".join(filter(None, (frames, describe_part(failure.part))))
 
 
 def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:

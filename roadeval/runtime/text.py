@@ -120,11 +120,7 @@ def _public(rest: str) -> str:
 
 def is_utf8(text: str) -> bool:
     """Return whether text is Unicode, and not the bytes of a name in another encoding."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+    return text.encode(errors="ignore").decode() == text
 
 
 def as_markdown(text: str) -> str:

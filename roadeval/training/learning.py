@@ -336,28 +336,21 @@ def choose_frames(
     elif settings.gap is None:
         gap = max(1, len(numbers) // max(4 * len(held.frames), 1))
     if lost and not held.frames:
-        raise TrainingError(
-            Sentence(
-                "none of the {} frames to train on can be decoded; the first: {}",
-                len(lost),
-                next(iter(lost.values())),
-            )
-        )
+        first, *_ = lost.values()
+        problem = "none of the {} frames to train on can be decoded; the first: {}"
+        raise TrainingError(Sentence(problem, len(lost), first))
     trained = {frame.number for frame in held.frames}
     places = {place for place, number in enumerate(numbers) if number in trained}
     near = {place + by for place in places for by in range(-gap * is_spread, gap + 1)} - places
     beside = frozenset(number for place, number in enumerate(numbers) if place in near)
     left = [number for number in numbers if number not in beside | trained | lost.keys()]
     if with_truth and trained and not left:
+        fewer = max(len(numbers) // (2 + 2 * gap), 1)
         used = f" ({len(trained)}) or left out as its gap ({len(beside)})" if beside else ""
         raise TrainingError(
             f"all {len(numbers)} labelled frames in the range are used for training{used}, so none "
             "is left to score",
-            remedy=Sentence(
-                "set {training.frames} to {}, {}",
-                max(len(numbers) // (2 + 2 * gap), 1),
-                WITHOUT_TRAINING,
-            ),
+            remedy=Sentence("set {training.frames} to {}, {}", fewer, WITHOUT_TRAINING),
         )
     return Schedule(gap=beside, first=left[0] if left else None)
 
@@ -370,11 +363,7 @@ def from_drives(
     A `TrainingError` if there is nothing to learn from; or some drives have truth and others have
     none; or none has truth and the settings insist on it.
     """
-    bare = [
-        path
-        for path, drive_frames in frames.items()
-        if all(frame.truth is None for frame in drive_frames)
-    ]
+    bare = [path for path, drawn in frames.items() if all(f.truth is None for f in drawn)]
     insists = settings.source == "truth" or len(bare) < len(frames)
     if bare and insists and settings.source != "patch":
         raise TrainingError(

@@ -80,11 +80,9 @@ class Model:
             return
         if variant not in self.settings:
             variants = ", ".join(sorted(self.settings))
-            raise ModelError(
-                f"the model has no variant {variant} (it has {variants})",
-                where=path,
-                remedy="train one with the same preset and variants",
-            )
+            problem = f"the model has no variant {variant} (it has {variants})"
+            remedy = "train one with the same preset and variants"
+            raise ModelError(problem, where=path, remedy=remedy)
         # Through JSON, as in the file, where tuples and lists are the same.
         relevant = json.loads(json.dumps(pipeline.relevant_settings()))
         made_for = self.settings[variant]
@@ -101,11 +99,9 @@ class Model:
                 )
         for name in pipeline.learning_stages():
             if name not in self.parameters.get(variant, {}):
-                raise ModelError(
-                    f"the model file is incomplete: {name} of variant {variant} has learnt nothing",
-                    where=path,
-                    remedy="train it again",
-                )
+                lacking = f"{name} of variant {variant} has learnt nothing"
+                problem = f"the model file is incomplete: {lacking}"
+                raise ModelError(problem, where=path, remedy="train it again")
 
 
 def save_model(model: Model, path: Path) -> None:
@@ -197,11 +193,8 @@ def read_archive(path: Path) -> tuple[Any, Arrays]:
     except Exception as error:  # four libraries read an archive, each with errors of its own
         if isinstance(error, OSError) and error.strerror:
             raise ModelError(f"cannot read the model: {error.strerror}", where=path) from error
-        raise ModelError(
-            "not a model file, or a damaged one",
-            where=path,
-            remedy="make one with 'roadeval train'",
-        ) from error
+        problem, remedy = "not a model file, or a damaged one", "make one with 'roadeval train'"
+        raise ModelError(problem, where=path, remedy=remedy) from error
 
 
 @validated(frozen=True)

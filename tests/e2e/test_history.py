@@ -36,6 +36,7 @@ def nights(street, tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.sweep
 def test_the_bad_commit_is_named_on_terminal_page_and_in_json(nights, tmp_path):
     outputs = [tmp_path / f"history.{end}" for end in ("html", "pdf", "md", "json")]
     run = here("history", nights, *(word for path in outputs for word in ("-o", path)))

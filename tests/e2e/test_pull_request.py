@@ -187,6 +187,7 @@ def test_a_repository_has_a_baseline_then_one_comment_that_each_push_updates(che
     assert (base / "summary.json").stat().st_mtime_ns == kept
 
 
+@pytest.mark.sweep
 def test_a_push_that_fails_is_no_baseline(check):
     check("good", {})
     before = (check.repository / ".roadeval" / "base" / "frames.csv").read_bytes()
@@ -194,6 +195,7 @@ def test_a_push_that_fails_is_no_baseline(check):
     assert (check.repository / ".roadeval" / "base" / "frames.csv").read_bytes() == before
 
 
+@pytest.mark.sweep
 def test_a_token_of_a_fork_leaves_the_summary_and_one_line(check, site):
     site.status = 403
     done = check("good", PULL)
@@ -223,6 +225,7 @@ def test_hostile_inputs_stay_words(check, site):
     assert site.ours[0].endswith("<!-- roadeval: --touch-pwned--touch-pwned-------octocat -->\n")
 
 
+@pytest.mark.sweep
 def test_gitlab_has_a_note_on_the_merge_request(check, site):
     about = {"CI_API_V4_URL": site.address, "CI_PROJECT_ID": 3, "CI_MERGE_REQUEST_IID": 8}
     done = check("good", PULL, GITHUB_EVENT_PATH="", CI_JOB_URL="https://lab.example/1", **about)
@@ -230,6 +233,7 @@ def test_gitlab_has_a_note_on_the_merge_request(check, site):
     assert site.calls == [("POST", "/projects/3/merge_requests/8/notes")]
 
 
+@pytest.mark.sweep
 def test_a_folder_of_drives_is_a_fleet(check):
     check("good", PULL, DRIVES="drives/")
     words = "fleet --record none --output .roadeval/new -- drives/\n"

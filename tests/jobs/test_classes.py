@@ -120,5 +120,6 @@ def test_a_fleet_has_the_classes_of_its_drives_and_says_their_mean(fleet, tmp_pa
 def test_a_fleet_from_before_classes_were_counted_has_none(fleet, tmp_path):
     old = shutil.copytree(fleet, tmp_path / "f")
     shutil.rmtree(old / "classes")
+    (old / "classes.parquet").unlink()
     assert Result(old).table("classes").empty
     assert "What is taken for road" not in write_report(old, tmp_path / "fleet.html").read_text()

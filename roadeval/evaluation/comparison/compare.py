@@ -22,13 +22,7 @@ from roadeval.data.words import setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics, tables
 from roadeval.evaluation.comparison import pairing
-from roadeval.evaluation.comparison.pairing import (
-    ComparedDrive,
-    Disagreement,
-    MovedFrame,
-    Pair,
-    Side,
-)
+from roadeval.evaluation.comparison.pairing import ComparedDrive, Pair, Side
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.settings import EvaluationSettings
@@ -170,9 +164,9 @@ class Comparison:
     """Each drive if several are compared, mask by mask, the surest first."""
     regions: tuple[RegionChange, ...]
     """The final masks of each new result, region by region."""
-    moved: tuple[MovedFrame, ...]
+    moved: tuple[pairing.MovedFrame, ...]
     """The frames of one drive that changed most."""
-    disagreements: tuple[Disagreement, ...]
+    disagreements: tuple[pairing.Disagreement, ...]
     """The frames of one drive on which final masks of one run disagree most."""
     warnings: tuple[str, ...]
     """Sentences on drives and frames that were left out, and on settings and truths that differ."""
@@ -206,12 +200,9 @@ def variants_as_sides(
             raise ComparisonError(f"no variant {name}", where=result.label, remedy=choice)
     if len(names) < 2:
         lone = f"{names[0]} alone" if names else "no variant"
-        raise ComparisonError(
-            f"{lone} cannot be compared",
-            where=result.label,
-            remedy="name two of its variants with --variant "
-            f"({', '.join(variants) or 'it has none'}), or a second result",
-        )
+        there = ", ".join(variants) or "it has none"
+        remedy = f"name two of its variants with --variant ({there}), or a second result"
+        raise ComparisonError(f"{lone} cannot be compared", where=result.label, remedy=remedy)
     return [replace(result, label=name, variants={name: name}) for name in names]
 
 
@@ -322,7 +313,7 @@ def _compare_two(
             "nothing can be compared; replay the same range into both"
         )
     one_camera = len(matched) == 1  # then a number names a frame
-    disagreed: Iterator[Disagreement] = iter(())
+    disagreed: Iterator[pairing.Disagreement] = iter(())
     if one_camera and across_variants:
         disagreed = pairing.disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
     of_masks, of_regions = (None, None) if several else (pairs, parts)

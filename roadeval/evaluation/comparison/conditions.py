@@ -92,11 +92,8 @@ class Condition:
             )
         stage, variant, rate, sign, number, unit, surely = match.groups()
         if rate not in QUANTITIES:
-            raise ConditionError(
-                f"there is no rate {rate}",
-                where=repr(text),
-                remedy=f"there are {', '.join(QUANTITIES)}",
-            )
+            remedy = f"there are {', '.join(QUANTITIES)}"
+            raise ConditionError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
         if surely and unit == "%":
             raise ConditionError(
                 "'surely' asks for the interval of a change (pp); a level (%) is that of the "
@@ -104,11 +101,8 @@ class Condition:
                 where=repr(text),
             )
         if surely and rate not in COMPARED:
-            raise ConditionError(
-                f"{rate} has no interval",
-                where=repr(text),
-                remedy=f"'surely' goes with {', '.join(COMPARED)}",
-            )
+            remedy = f"'surely' goes with {', '.join(COMPARED)}"
+            raise ConditionError(f"{rate} has no interval", where=repr(text), remedy=remedy)
         limit = float(number), unit == "pp", bool(surely)
         return cls(" ".join(text.split()), stage, variant, rate, sign, *limit)
 

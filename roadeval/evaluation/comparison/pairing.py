@@ -177,17 +177,17 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     out: its ERR would describe other places. Pixels are taken for the same if each frame of a drive
     has as many of them, and as many of road. Frames that label none of them are left out, too.
     """
-    numbered = pairs[[*KEY, "variant", "stage", "stage_base", "frame", "frame_base", "stamp_ns"]]
+    numbered = pairs[[*KEY, "variant", "stage", "stage_base", "frame", "frame_base"]]
     numbered = numbered.assign(pair=np.arange(len(pairs)))
     words = dict.fromkeys((*KEY, "variant", "stage", "region"), "str")
     by = [*KEY, "variant"]
+    on = ["pair", *by, "region"]
     sides = []
     for table, end in ((base, "_base"), (new, "")):
         keys = {"stage": f"stage{end}", "frame": f"frame{end}"}
         rows = table.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
         rows = numbered.astype({f"stage{end}": "str", **dict.fromkeys(by, "str")}).merge(rows)
-        sides.append(rows[["pair", *by, "region", *COUNTS]])
-    on = ["pair", *by, "region"]
+        sides.append(rows[[*on, *COUNTS]])
     both = sides[0].merge(sides[1], on=on, how="outer", suffixes=("_base", ""), indicator="in")
     counts = both[[*COUNTS, *(f"{name}_base" for name in COUNTS)]].fillna(0).astype(np.int64)
     both[counts.columns] = counts
@@ -199,7 +199,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     in_both = parts[["labelled", "in_new"]].transform("any").all(axis=1)
     shared = parts["same"].transform("all") & in_both
     both = both[shared & both["labelled"]].sort_values("pair", kind="stable")
-    stamps = numbered.set_index("pair")["stamp_ns"].reindex(both["pair"]).to_numpy()
+    stamps = pairs["stamp_ns"].to_numpy()[both["pair"]]
     both = both.assign(stamp_ns=stamps, final=True)
     tested = {TESTED: METRICS[TESTED]}
     return both.join([rates_of(both, tested), rates_of(both, tested, end="_base")])

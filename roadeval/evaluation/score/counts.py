@@ -10,21 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import (
-    ERRORS,
-    Change,
-    Contour,
-    FrameResult,
-    Layer,
-    Mask,
-    Packed,
-    Role,
-    Transition,
-    Truth,
-    TruthBits,
-    everywhere,
-    ones,
-)
+from roadeval import data
+from roadeval.data import ERRORS, TruthBits, everywhere, ones
 from roadeval.data.arrays import IGNORED, Bits, Sums
 from roadeval.evaluation.region import disk, grow, square
 from roadeval.kernels import KERNELS
@@ -47,13 +34,13 @@ def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
     return np.stack([tp, negatives - fp, fp, positives - tp], axis=2)
 
 
-def error_map(mask: Mask, truth: Truth) -> Layer:
+def error_map(mask: data.Mask, truth: data.Truth) -> data.Layer:
     """Classify each pixel by its outcome, as in `roadeval.data.ERRORS`.
 
     ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` is alike, but 255 for ignored pixels.
     """
     # TN 0 and TP 1 if the two agree, else FP 2 and FN 3; ignored pixels are beyond 4.
-    return Layer(ERRORS, np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED)))
+    return data.Layer(ERRORS, np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED)))
 
 
 def flat(masks: Bits | Sequence[Bits]) -> Bits:
@@ -62,7 +49,9 @@ def flat(masks: Bits | Sequence[Bits]) -> Bits:
     return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
 
 
-def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Transition, Change]:
+def changes(
+    names: Sequence[Name], masks: Bits, truth: TruthBits
+) -> dict[data.Transition, data.Change]:
     """Count what each stage changed in the mask before it, and each final mask in the others.
 
     ``names`` are variant and stage of each mask, a variant's stages in the order they ran;
@@ -76,7 +65,7 @@ def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Transi
     pixels, transitions = ones(labelled), {}
     for before, after in chain(steps, permutations(finals.values(), 2)):
         repaired, spoiled = (both[place][place] - both[before][after] for place in (before, after))
-        transitions[*names[before], *names[after]] = Change(repaired, spoiled, pixels)
+        transitions[*names[before], *names[after]] = data.Change(repaired, spoiled, pixels)
     return transitions
 
 
@@ -114,12 +103,12 @@ class EdgesAndFlicker:
     def __init__(self, width: int) -> None:
         self._width = width
         self._sums = defaultdict[str, _VariantSums](_VariantSums)
-        self._before: tuple[TruthBits, Mapping[str, Packed]] | None = None
+        self._before: tuple[TruthBits, Mapping[str, data.Packed]] | None = None
 
-    def add(self, result: FrameResult) -> None:
+    def add(self, result: data.FrameResult) -> None:
         """Add a frame, in the drive's order. One that is not evaluated interrupts the flicker."""
         now = result.truth_bits
-        if result.role is not Role.EVALUATED or now is None:
+        if result.role is not data.Role.EVALUATED or now is None:
             self.interrupt()
             return
         for name, (*scores, counts) in result.contours.items():
@@ -168,7 +157,7 @@ class EdgesAndFlicker:
 
 def contours(
     masks: Mapping[str, Bits], truth: TruthBits, width: int, widths: Sequence[int] = TRIMAP
-) -> dict[str, Contour]:
+) -> dict[str, data.Contour]:
     """Compute how well masks, ``(H, words)`` each by name, follow the truth's edge.
 
     Boundary F is ``F = 2 P R / (P + R)`` [1]_ [2]_. P is the share of the mask's edge pixels that

@@ -7,26 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from roadeval.data import (
-    BASELINE,
-    FINAL_STAGE,
-    IGNORE,
-    ROAD,
-    Counts,
-    Frame,
-    FrameResult,
-    Health,
-    Packed,
-    Probability,
-    Role,
-    Tally,
-    Truth,
-    TruthBits,
-    VariantResult,
-    histogram,
-)
+from roadeval import data
+from roadeval.data import BASELINE, FINAL_STAGE, IGNORE, ROAD, FrameResult, Packed, Role, TruthBits
 from roadeval.data.arrays import Bits, Values
-from roadeval.data.result import Cells
 from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.metres import ABOVE, survey_of
 from roadeval.evaluation.region import LabelledFrame
@@ -46,9 +29,9 @@ from roadeval.geometry.ground import Ground
 
 
 def score_frame(
-    frame: Frame,
+    frame: data.Frame,
     role: Role,
-    variants: tuple[VariantResult, ...],
+    variants: tuple[data.VariantResult, ...],
     settings: EvaluationSettings,
     prior: BlindPrior | None,
     *,
@@ -70,7 +53,7 @@ def score_frame(
         return result
     if role is Role.TRAINING:
         by_stage = _probabilities(variants).items()
-        return replace(result, histograms={name: histogram(p, truth) for name, p in by_stage})
+        return replace(result, histograms={name: data.histogram(p, truth) for name, p in by_stage})
     if role is Role.EVALUATED:
         return _evaluate(result, truth, settings, prior, ground)
     if role is not Role.PICKED:
@@ -80,7 +63,7 @@ def score_frame(
     return replace(scored, tallies=(), apart=apart)
 
 
-def score_finals(result: FrameResult, truth: Truth) -> FrameResult:
+def score_finals(result: FrameResult, truth: data.Truth) -> FrameResult:
     """Return a frame's result with the counts and errors of its final masks alone."""
     finals = {(v.variant, [*v.masks()][-1][0]): Packed.of(v.final()) for v in result.variants}
     bits = TruthBits.of(truth)
@@ -93,7 +76,7 @@ def score_finals(result: FrameResult, truth: Truth) -> FrameResult:
 
 def _evaluate(
     result: FrameResult,
-    truth: Truth,
+    truth: data.Truth,
     settings: EvaluationSettings,
     prior: BlindPrior | None,
     ground: Ground | None,
@@ -112,7 +95,7 @@ def _evaluate(
     last_places = {variant: place for place, (variant, _) in enumerate(names)}
     for variant, measures in metres.items():
         final = tallies[last_places[variant]]
-        with_cells = {**final.regions, ABOVE: Counts(*measures.counts[0, -1].tolist())}
+        with_cells = {**final.regions, ABOVE: data.Counts(*measures.counts[0, -1].tolist())}
         tallies[last_places[variant]] = replace(final, regions=with_cells)
     rates = {mask.variant: mask.rates for mask in tallies}  # a variant's final mask is its last
     blind = rates.pop(BASELINE, None)
@@ -123,6 +106,7 @@ def _evaluate(
             replaced.setdefault(oracle, {}).update(by_stage)
     probabilities = _probabilities(variants).items()
     finals = {v.variant: v.final() for v in variants}
+    codes = frame.classes
     by_class = {} if prior is None else {BASELINE: masks[BASELINE, FINAL_STAGE].pixels()}
     return replace(
         result,
@@ -132,7 +116,7 @@ def _evaluate(
         truth_bits=labels,
         changes=changes(names, bits, labels),
         contours=contours(final_bits, labels, settings.boundary_width),
-        histograms={name: histogram(p, truth) for name, p in probabilities},
+        histograms={name: data.histogram(p, truth) for name, p in probabilities},
         oracles={
             oracle: tuple(tally([*stages], labels.bits_of(stages.values()), labels))
             for oracle, stages in replaced.items()
@@ -140,15 +124,11 @@ def _evaluate(
         metres=metres,
         kitti=count_levels(frame, masks, dict(probabilities)),
         above={name: survey.levels(p, truth) for name, p in probabilities} if survey else {},
-        classes=(
-            {}
-            if frame.classes is None
-            else count_classes(frame.classes, truth, {**finals, **by_class})
-        ),
+        classes={} if codes is None else count_classes(codes, truth, finals | by_class),
     )
 
 
-def _probabilities(variants: Sequence[VariantResult]) -> dict[Name, Probability]:
+def _probabilities(variants: Sequence[data.VariantResult]) -> dict[Name, data.Probability]:
     """Return how probable road is, for each stage that says so."""
     return {
         (variant.variant, result.stage): result.output.probability
@@ -159,32 +139,29 @@ def _probabilities(variants: Sequence[VariantResult]) -> dict[Name, Probability]
 
 
 def tally(
-    names: Sequence[Name],
-    masks: Bits,
-    truth: TruthBits,
-    by_name: Mapping[str, Bits] | None = None,
-) -> list[Tally]:
+    names: Sequence[Name], masks: Bits, truth: TruthBits, by_name: Mapping[str, Bits] | None = None
+) -> list[data.Tally]:
     """Count named masks, ``(K, H, words)``, in the whole frame and in regions by their names."""
     by_name = by_name or {}
     counted = count(masks, truth, [*by_name.values()])
     tallies = []
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
-        frame, *parts = (Counts(*row) for row in rows)
+        frame, *parts = (data.Counts(*row) for row in rows)
         by_region = dict(zip(by_name, parts, strict=True))
-        tallies.append(Tally(variant, stage, frame, by_region, metrics.of(frame)))
+        tallies.append(data.Tally(variant, stage, frame, by_region, metrics.of(frame)))
     return tallies
 
 
-def judge(rates: Mapping[str, float], blind: Mapping[str, float] | None) -> Health:
+def judge(rates: Mapping[str, float], blind: Mapping[str, float] | None) -> data.Health:
     """Return a variant's health by its final mask's rates and the baseline's, if there is one.
 
     An undefined rate counts neither for nor against it. `roadeval.evaluation.settings` gives the
     thresholds and their reasons.
     """
     if rates["ERR"] >= FAILED_ERR or rates["FNR"] >= FAILED_FNR:
-        return Health.FAILED
+        return data.Health.FAILED
     worse = blind is not None and rates["ERR"] - blind["ERR"] > DEGRADED_MARGIN
-    return Health.DEGRADED if worse or rates["ERR"] >= DEGRADED_ERR else Health.OK
+    return data.Health.DEGRADED if worse or rates["ERR"] >= DEGRADED_ERR else data.Health.OK
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,31 +173,25 @@ class BlindPrior:
     that label it; 0 if none does."""
 
     @classmethod
-    def of_truths(cls, truths: Sequence[Truth]) -> BlindPrior:
+    def of_truths(cls, truths: Sequence[data.Truth]) -> BlindPrior:
         """Average the truths, each ``(H, W)`` uint8 with 255 for ignored; a ValueError for none.
 
         Truths of another size than the first are resized to it, nearest pixel.
         """
         if not truths:
             raise ValueError("a prior needs at least one truth")
+        import cv2
+
         road = np.zeros(truths[0].shape, np.float32)
         labelled = np.zeros_like(road)
         for truth in truths:
-            resized = _resize(truth, road.shape, mixed=False)
+            resized = cv2.resize(truth, road.shape[::-1], interpolation=cv2.INTER_NEAREST)
             road += resized == ROAD
             labelled += resized != IGNORE
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
         """Return the mask for a frame of ``shape`` (height, width): road from one half."""
-        return Packed.of(_resize(self.road, shape, mixed=True) >= 0.5)
+        import cv2
 
-
-def _resize(image: Cells, shape: tuple[int, ...], *, mixed: bool) -> Cells:
-    """Return an image in another size; the nearest pixels if values may not be ``mixed``."""
-    if image.shape == shape:
-        return image
-    import cv2
-
-    how = cv2.INTER_LINEAR if mixed else cv2.INTER_NEAREST
-    return cv2.resize(image, shape[1::-1], interpolation=how)
+        return Packed.of(cv2.resize(self.road, shape[::-1]) >= 0.5)

@@ -19,24 +19,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import (
-    BASELINE,
-    FILTERED,
-    FINAL_STAGE,
-    OUTCOMES,
-    TUNED,
-    UNFILTERED,
-    Change,
-    Counts,
-    Doubt,
-    Frame,
-    FrameResult,
-    Role,
-    Transition,
-    TruthClass,
-    VariantResult,
-    as_tree,
-)
+from roadeval import data
+from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, OUTCOMES, TUNED, UNFILTERED, as_tree
 from roadeval.data.arrays import Floats, Sums
 from roadeval.evaluation import tables
 from roadeval.evaluation.metrics import COMPARED, METRICS, TESTED
@@ -154,7 +138,7 @@ class CountedRows:
         """Place of the frame, place of its names, and the four counts, again and again."""
         self._places: Final[dict[tuple[str, ...], int]] = {}
 
-    def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], Counts]]) -> None:
+    def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], data.Counts]]) -> None:
         """Add the counts of the evaluated frame at a place, by their names."""
         for names, four in counts:
             row = self._places.setdefault(names, len(self._places))
@@ -251,7 +235,7 @@ class Scoreboard:
         self._disturbed = CountedRows("disturbance", "variant", "stage")
         self.heat = defaultdict[str, HeatMap](HeatMap)
         """The places where each variant's final mask errs."""
-        self.changes = defaultdict[Transition, Change](Change)
+        self.changes = defaultdict[data.Transition, data.Change](data.Change)
         """Every change between masks."""
         self.curves = Curves()
         self.classes = ClassSums()
@@ -264,12 +248,14 @@ class Scoreboard:
         self._edges = EdgesAndFlicker(settings.boundary_width)
         self._seconds = defaultdict[Name, list[float]](lambda: [0.0, 0])
 
-    def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
+    def score(
+        self, frame: data.Frame, role: data.Role, variants: tuple[data.VariantResult, ...]
+    ) -> data.FrameResult:
         """Score one frame; this changes nothing, so any thread may call it at any time."""
         settings, prior = self._settings, self._prior
         return score_frame(frame, role, variants, settings, prior, ground=self._ground)
 
-    def add(self, result: FrameResult) -> tuple[Doubt, ...]:
+    def add(self, result: data.FrameResult) -> tuple[data.Doubt, ...]:
         """Add a scored frame: in the drive's order, from one thread.
 
         Returned are the doubts on a frame without truth.
@@ -302,7 +288,7 @@ class Scoreboard:
         for name, layer in result.errors.items():
             self.heat[name].add(layer.array.astype(np.uint8, copy=False))
         for step, change in result.changes.items():
-            self.changes[step] = Change(*map(add, self.changes[step], change))
+            self.changes[step] = data.Change(*map(add, self.changes[step], change))
         self.curves.add(result.histograms)
         self.classes.add(result.frame.moment, result.classes)
         self._metres.add(result.metres)
@@ -343,7 +329,7 @@ class Scoreboard:
         """
         return self.curves.at_best_of(self._training)
 
-    def summary(self, classes: Sequence[TruthClass] = ()) -> DriveSums:
+    def summary(self, classes: Sequence[data.TruthClass] = ()) -> DriveSums:
         """Sum up the drive; ``classes`` are those of its truth, in the order of codes."""
         settings, frames = self._settings, self.frames()
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
@@ -374,7 +360,7 @@ class Scoreboard:
         return DriveSums(frames, windows, drive_effects(frames, settings), parts, disturbed)
 
     def _slices(
-        self, frames: pd.DataFrame, classes: Sequence[TruthClass]
+        self, frames: pd.DataFrame, classes: Sequence[data.TruthClass]
     ) -> dict[str, list[Slice]]:
         """Return the slices of each final mask; nothing if there are too few frames."""
         key, confidence = dict(zip(KEY, self._key, strict=True)), self._settings.confidence
@@ -403,7 +389,5 @@ class DriveSums:
     @property
     def times(self) -> dict[str, int]:
         """Header stamps of the first and the last evaluated frame; none without any."""
-        stamps = self.frames["stamp_ns"]
-        return (
-            {"start_ns": int(stamps.iloc[0]), "end_ns": int(stamps.iloc[-1])} if len(stamps) else {}
-        )
+        stamps = self.frames["stamp_ns"].tolist()
+        return {"start_ns": stamps[0], "end_ns": stamps[-1]} if stamps else {}

@@ -23,14 +23,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import (
-    CERTAIN,
-    CODES,
-    Histogram,
-    as_tree,
-    best_code,
-    wrong_above,
-)
+from roadeval.data import CERTAIN, CODES, Histogram, as_tree, best_code, wrong_above
 from roadeval.data.arrays import FN, FP, IGNORED, Floats, Plane, Sums
 from roadeval.data.result import Cells
 from roadeval.evaluation.score.counts import Name

@@ -115,12 +115,9 @@ def _failure_sentence(result: Result) -> str:
     failed = only(drives, status=FAILED)["name"].tolist()
     if not failed:
         return ""
-    named = first_of(failed, NAMED)
     verb = "is" if len(failed) == 1 else "are"
-    return (
-        f"{result.name}: {len(failed)} of {len(drives)} drives failed and {verb} in no number: "
-        f"{named}"
-    )
+    failures = f"{len(failed)} of {len(drives)} drives failed and {verb} in no number"
+    return f"{result.name}: {failures}: {first_of(failed, NAMED)}"
 
 
 def _choose_sides(

@@ -180,19 +180,14 @@ def _runs_in_order(
             lost.append(f"{path}: has no label {by}")
         else:
             groups.setdefault(origin.labels[by] if by else path, []).append((origin, path))
-    times = [
-        datetime.fromtimestamp((members[0][0].made_ns or 0) / 1e9, UTC)
-        for members in groups.values()
-    ]
+    firsts = [members[0][0] for members in groups.values()]
+    times = [datetime.fromtimestamp((origin.made_ns or 0) / 1e9, UTC) for origin in firsts]
     forms = ("%Y-%m-%d", "%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S")
     distinct = (form for form in forms if len({f"{time:{form}}" for time in times}) == len(times))
     form = next(distinct, forms[-1])
-    return [
-        RunFacts(
-            tuple(p for _, p in members), members[0][0], title=name if by else f"{time:{form}}"
-        )
-        for (name, members), time in zip(groups.items(), times, strict=True)
-    ]
+    titles = [*groups] if by else [f"{time:{form}}" for time in times]
+    paths = [tuple(path for _, path in members) for members in groups.values()]
+    return [RunFacts(*run) for run in zip(paths, firsts, titles, strict=True)]
 
 
 def _origin(result: Result, path: Path) -> Origin:

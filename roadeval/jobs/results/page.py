@@ -162,13 +162,11 @@ def _choose_frames(result: DriveResult, count: int) -> list[int]:
     there = [number for number in result.pictured if number in scored_frames]
     pictured = there or [*result.pictured]
     focus = result.facts.focus
-    count = min(count, len(pictured))
     spread = evenly(pictured, count)
     if focus is None:
         unlabelled = result.facts.unlabelled
-        doubtful = [
-            frame for frame in (unlabelled.look_at if unlabelled else ()) if frame in pictured
-        ]
+        look_at = unlabelled.look_at if unlabelled else ()
+        doubtful = [frame for frame in look_at if frame in pictured]
         return list(dict.fromkeys([*doubtful, *spread]))[:count]
     masks = finals(only(rows, variant=focus))
     worst = tables.worst(masks[masks["frame"].isin(pictured)], count)["frame"].tolist()

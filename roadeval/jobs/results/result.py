@@ -328,11 +328,7 @@ class Result:
         self._opened: list[Opened] = [r for path in self.paths for r in _open(path, focus)]
         if focus:
             scored = [[*result.facts.finals] for result in self._opened]
-            doubts = [
-                values_of(result.table("unlabelled"), "variant")
-                for result in self._opened
-                if isinstance(result, DriveResult)
-            ]
+            doubts = [values_of(drive.table("unlabelled"), "variant") for drive in self._drives]
             focus_of(dict.fromkeys(chain.from_iterable(scored + doubts)), focus)
 
     @cached_property
@@ -347,8 +343,11 @@ class Result:
     @property
     def rig(self) -> list[DriveResult]:
         """The cameras of a drive, where the result of several was opened alone; else none."""
-        cameras = [result for result in self._opened if isinstance(result, DriveResult)]
-        return cameras if len(self.paths) == 1 < len(cameras) else []
+        return self._drives if len(self.paths) == 1 < len(self._drives) else []
+
+    @property
+    def _drives(self) -> list[DriveResult]:
+        return [result for result in self._opened if isinstance(result, DriveResult)]
 
     @property
     def name(self) -> str:
@@ -364,8 +363,7 @@ class Result:
     @property
     def drive(self) -> DriveResult | None:
         """The result of the one drive, where a recording or its folder was opened alone."""
-        (first, *more) = self._opened
-        return first if isinstance(first, DriveResult) and not more else None
+        return self._drives[0] if self._drives and len(self._opened) == 1 else None
 
     @cached_property
     def facts(self) -> Facts | FleetFacts:
@@ -391,15 +389,13 @@ class Result:
     @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings that a reader should see first."""
-        warnings = (result.warnings for result in self._opened if isinstance(result, DriveResult))
-        return tuple(dict.fromkeys(chain.from_iterable(warnings)))
+        return tuple(dict.fromkeys(chain(*(drive.warnings for drive in self._drives))))
 
     @property
     def recording(self) -> Path | None:
         """The recording, where that was opened alone."""
-        (path, *more), (first, *_) = self.paths, self._opened
-        alone = isinstance(first, DriveResult) and first.recording and not more
-        return path if alone else None
+        alone = len(self.paths) == 1 and self._drives and self._drives[0].recording
+        return self.paths[0] if alone else None
 
     @cached_property
     def variants(self) -> list[str]:

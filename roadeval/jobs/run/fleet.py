@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError, Executor, Future, as_completed
+from concurrent.futures import CancelledError, Executor, as_completed
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -201,39 +201,30 @@ class FleetRun:
         folds = deal(groups_of(self.entries), count, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
         drawn = [by_id[drive] for drive in shuffle(by_id, settings.training.seed)]
-        training = [
-            FoldTask(
-                self.folder,
-                fold,
-                tuple((e, configs[e.id]) for e in drawn if folds[e.id] != fold),
-                settings,
-                software(settings),
-            )
-            for fold in range(count)
-        ]
+        training = []
+        for fold in range(count):
+            others = tuple((e, configs[e.id]) for e in drawn if folds[e.id] != fold)
+            training.append(FoldTask(self.folder, fold, others, settings, software(settings)))
         self.show("training")
         futures = [engine.submit(train_fold, task) for task in training]
-        made = [self._model(future, fold) for fold, future in enumerate(futures)]
-        tasks = []
+        made, tasks = [], []
+        for fold, future in enumerate(futures):
+            try:
+                made.append(future.result())
+            except Exception as error:  # it fails the fold's drives alone
+                problem = self._reason(error, f"the model of fold {fold} was trained")
+                made.append(FoldModel(fold, "", problem))
         for entry in self.entries:
-            fold = made[folds[entry.id]]
-            config = configs[entry.id].override(
-                {"training": {"model": str(training[fold.fold].path)}}
-            )
-            how = software(config), fold.sha256, fold.fold
+            model = made[folds[entry.id]]
+            path = str(training[model.fold].path)
+            config = configs[entry.id].override({"training": {"model": path}})
+            how = software(config), model.sha256, model.fold
             task = DriveTask(self.folder, entry, config, *how)
-            if fold.problem:
-                self._fail(task, fold.problem)
+            if model.problem:
+                self._fail(task, model.problem)
             else:
                 tasks.append(task)
         return tasks
-
-    def _model(self, future: Future[FoldModel], fold: int) -> FoldModel:
-        """Wait for the model of a fold; one that fails fails its drives alone."""
-        try:
-            return future.result()
-        except Exception as error:
-            return FoldModel(fold, "", self._reason(error, f"the model of fold {fold} was trained"))
 
     def _replay(self, tasks: Sequence[DriveTask]) -> None:
         """Replay the tasks' drives, and take each result as it comes."""
@@ -258,13 +249,11 @@ class FleetRun:
 
     def _reason(self, error: Exception, doing: str) -> str:
         """Return why a task has failed; what ends the whole run is raised."""
-        match error:
-            case RoadevalError():
-                raise error
-            case CancelledError():
-                raise FleetError(
-                    "the workers have gone, or their scheduler", where=self.folder, remedy=GO_ON
-                ) from error
+        if isinstance(error, RoadevalError):
+            raise error
+        if isinstance(error, CancelledError):
+            problem = "the workers have gone, or their scheduler"
+            raise FleetError(problem, where=self.folder, remedy=GO_ON) from error
         if is_worker_death(error):
             return (
                 f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "

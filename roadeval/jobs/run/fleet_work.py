@@ -198,10 +198,9 @@ def _try_replay(task: DriveTask) -> Made:
         if _disk_failure(error):
             raise
         is_known = isinstance(error, RoadevalError) or memory.is_lacking(error)
-        message = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
-        reason = (
-            message if is_known else f"{type(error).__name__}: {message} (a defect of roadeval)"
-        )
+        reason = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
+        if not is_known:
+            reason = f"{type(error).__name__}: {reason} (a defect of roadeval)"
         return mark_failed(task, reason, 1 if is_known else 70)
     seconds = time.perf_counter() - started
     return Made(task.entry.id, task.asked, stamp, task.fold, task.model or None, seconds=seconds)
@@ -216,9 +215,8 @@ def _replay(task: DriveTask) -> None:
         focus=task.focus,
         figures=False,
     )
-    config = replace(
-        task.config, output=output, run=replace(task.config.run, jobs=1), fleet=FleetSettings()
-    )
+    alone = replace(task.config.run, jobs=1)
+    config = replace(task.config, output=output, run=alone, fleet=FleetSettings())
     pictures = WorstPictures(task.focus)
     outcome = replay(task.entry.source, config, on_frame=pictures.offer)
     _remove(task, PICTURES, *CACHED, *([RECORDINGS] if task.record == "none" else []))
@@ -341,12 +339,9 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
     drawn, passed = _draw_frames(task)
     if not drawn:
         why = f": {min(passed.values())}" if passed else ""
-        return FoldModel(
-            task.fold,
-            "",
-            f"the model of fold {task.fold} could not be trained: none of the "
-            f"{len(task.candidates)} drives of the other folds gives training frames{why}",
-        )
+        others = f"none of the {len(task.candidates)} drives of the other folds"
+        problem = f"could not be trained: {others} gives training frames{why}"
+        return FoldModel(task.fold, "", f"the model of fold {task.fold} {problem}")
     try:
         model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
     except TrainingError as error:

@@ -160,12 +160,10 @@ class Run:
         """The camera's calibration, for frames as they are read."""
         calibration, size = self.selection.calibration, self.selection.size
         if (ground := self.selection.ground_as_read) and ground.is_posed:
-            frame = calibration.frame_id if calibration else self.key.camera.strip("/")
-            topic, mounting = (
-                (calibration.topic, calibration.mounting) if calibration else ("", None)
-            )
             lens = ground.width, ground.height, ground.matrix, ground.model, ground.distortion
-            return Calibration(topic, *lens, frame, mounting)
+            if calibration is None:
+                return Calibration("", *lens, self.key.camera.strip("/"))
+            return Calibration(calibration.topic, *lens, calibration.frame_id, calibration.mounting)
         return calibration.scaled(*size) if calibration and size else None
 
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
@@ -242,12 +240,8 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     frames = len(stream)
     truths = frames if selection.truth is None else len(selection.truth.pictures)
     if frames > SPARSE * truths and picks is None:
-        note = Sentence(
-            "at most {} of {} frames have road truth: {frames.labelled} reads these alone",
-            truths,
-            frames,
-        )
-        on_progress(Progress(0, None, "opening", note))
+        note = "at most {} of {} frames have road truth: {frames.labelled} reads these alone"
+        on_progress(Progress(0, None, "opening", Sentence(note, truths, frames)))
     model, schedule = _learn(
         again, variants, config.training, on_progress, labelled=labelled, picks=picks
     )
@@ -256,15 +250,10 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     except MisfitError as error:
         raise ModelError.of(error, config.training.model) from error
     trim()
-    masks = selection.masks
-    layouts = (
-        *(variant.layout() for variant in variants),
-        *(
-            external_layout(name, source.where, probable=source.is_confidence)
-            for name, source in masks.items()
-            if name not in chains
-        ),
-    )
+    layouts = [variant.layout() for variant in variants]
+    for name, source in selection.masks.items():
+        if name not in chains:
+            layouts.append(external_layout(name, source.where, probable=source.is_confidence))
     prior = None if model.prior is None else BlindPrior(model.prior)
     names = [layout.name for layout in layouts]
     key = Key(log.name, camera or selection.image.name)
@@ -282,7 +271,7 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
         model,
         schedule,
         chains,
-        layouts,
+        tuple(layouts),
         {variant.name: about for variant in variants if (about := variant.pipeline.about())},
         board,
         FitCheck(selection.among_truth(stream.numbers), config.frames.every),
@@ -363,10 +352,7 @@ def identity(log: Log, config: RunConfig, masks: Mapping[str, str] | None = None
 
 def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
     """Return a digest of settings, software, the SHA-256 of a model, and more, in hexadecimal."""
-    masks = {
-        name: replace(mask_settings, path="", images=None)
-        for name, mask_settings in config.masks.items()
-    }
+    masks = {name: replace(m, path="", images=None) for name, m in config.masks.items()}
     truth = replace(config.truth, path="", images=None)
     nowhere = "" if config.training.adapt else None  # wherever the file lies
     training = replace(config.training, model=nowhere)
@@ -434,11 +420,8 @@ def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
     others = Sentence(" ").join(Sentence("{only} {}", name) for name in names)
     remedy = Sentence("mend it, or leave the variant out with {}", others) if names else "mend it"
     frames = f"the first {len(failures)} frames ({first.frame} to {last.frame})"
-    return StageError(
-        Sentence("{}, on each of {}", first.reason, frames),
-        where=f"variant {first.variant}",
-        remedy=remedy,
-    )
+    problem = Sentence("{}, on each of {}", first.reason, frames)
+    return StageError(problem, where=f"variant {first.variant}", remedy=remedy)
 
 
 def _process(

@@ -146,7 +146,7 @@ def misfits_of_truth(log: Log) -> Iterator[str]:
     numbers = selection.among_truth(log.frames(selection).numbers)
     places = np.linspace(0, len(numbers) - 1, FEW, dtype=int).tolist()
     every = log.config.frames.every
-    lags = [lag * every for lag in range(-LAST_LAG, LAST_LAG + 1)]
+    lags = range(-LAST_LAG * every, LAST_LAG * every + 1, every)
     near = {numbers[place] + lag for place in places for lag in lags}
     fit = FitCheck(numbers, every, FEW)
     for logged in log.frames(selection, near):
@@ -353,11 +353,8 @@ def _network_warnings(run: Run) -> Iterator[str]:
     for name, stages in run.methods.items():
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
         if probable and not name.endswith(TUNED):
-            yield Sentence(
-                "{}: the network's output is taken for probabilities, for it stays within 0 and "
-                "1; if it holds logits, set {net.activation}",
-                name,
-            )
+            taken = "the network's output is taken for probabilities, for it stays within 0 and 1"
+            yield Sentence("{}: {}; if it holds logits, set {net.activation}", name, taken)
 
 
 def _tuning_warnings(run: Run) -> Iterator[str]:
@@ -393,11 +390,9 @@ def _label_warnings(run: Run) -> Iterator[str]:
     if run.selection.truth is not None and not run.frames.accounting.labelled:
         stride = run.config.frames.every
         why = Sentence(": {frames.every} {} leaves out each one that has", stride)
-        yield Sentence(
-            "none of the frames that were read has road truth{}; {frames.labelled} reads only "
-            "frames that have",
-            why if stride > 1 else "",
-        )
+        problem = "none of the frames that were read has road truth"
+        remedy = Sentence("{frames.labelled} reads only frames that have")
+        yield Sentence("{}{}; {}", problem, why if stride > 1 else "", remedy)
 
 
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:

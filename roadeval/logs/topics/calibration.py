@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import Calibration, Mounting
-from roadeval.data.arrays import Vector
+from roadeval.data.arrays import Floats
 from roadeval.images.formats import Size
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
@@ -27,7 +27,7 @@ OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
 """The rotation from a camera's axes to those of a vehicle: x ahead, y left, z up (REP 103)."""
 
 _UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError, OverflowError
-Transform = tuple[str, Vector, Vector]
+Transform = tuple[str, Floats, Floats]
 """The parent frame, and translation and quaternion (x, y, z, w) in it."""
 LensAndNote = tuple[Calibration | None, str]
 """A calibration for the images and remarks on it, or None and why there is none."""
@@ -77,7 +77,11 @@ def calibration_of(
         if last not in (None, lens):
             return None, f"{topic}: it changes within the log"
     static = [info.name for info in topics if info.kind is TopicKind.TRANSFORMS and info.count]
-    transforms = dict(_read_transforms(readers[name] for name in static))
+    transforms = dict[str, Transform]()
+    for reader in (readers[name] for name in static):
+        for position in range(min(len(reader), 100)):
+            with suppress(*_UNREADABLE):  # later ones replace earlier ones
+                transforms.update(_transforms_in(reader.fields(position)))
     notes, mounting = [why] * bool(why), None
     if static and not transforms:
         notes.append(f"its place is not known: {', '.join(static)} cannot be read")
@@ -198,14 +202,6 @@ def _fit_to_size(full: Calibration, message: Any, size: Size) -> LensAndNote:
     return None, f"it is for images of {part.width}x{part.height}"
 
 
-def _read_transforms(readers: Iterator[TopicReader]) -> Iterator[tuple[str, Transform]]:
-    """Yield the transform of each frame in its parent; later ones replace earlier ones."""
-    for reader in readers:
-        for position in range(min(len(reader), 100)):
-            with suppress(*_UNREADABLE):
-                yield from _transforms_in(reader.fields(position))
-
-
 def _transforms_in(message: Any) -> Iterator[tuple[str, Transform]]:
     """Yield the frame and the transform of each part of a message of ROS or Foxglove."""
     for frame in getattr(message, "transforms", [message]):
@@ -244,7 +240,7 @@ def _find_mounting(frame: str, transforms: Mapping[str, Transform]) -> Mounting 
     return None
 
 
-def _product(one: Vector, other: Vector) -> Any:
+def _product(one: Floats, other: Floats) -> Any:
     """Multiply two quaternions x, y, z, w."""
     (a, b), (c, d) = (one[:3], one[3]), (other[:3], other[3])
     return np.append(b * c + d * a + np.cross(a, c), b * d - a @ c)

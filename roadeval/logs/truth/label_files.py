@@ -26,7 +26,7 @@ from roadeval.logs.truth.picks import LABELS, PICK, PROPOSALS
 from roadeval.logs.truth.shapes import ClassRoles, DrawnLabel, LabelFormat, settle_shapes
 from roadeval.runtime.discovery import collect, installed
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import check_input
+from roadeval.runtime.files import check_input, reading
 
 GREATEST: Final = 256 << 20
 """Most bytes of a file of labels."""
@@ -52,10 +52,8 @@ def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = Non
             raise LogError("no label in it yet", where=path, remedy=remedy)
     if path.is_file() and path.suffix.lower() not in _formats():
         names = sorted({format_.name for formats in _formats().values() for format_ in formats})
-        listing = ", ".join(names)
-        raise LogError(
-            "no file of labels", where=path, remedy=f"known are folders of images, and {listing}"
-        )
+        remedy = f"known are folders of images, and {', '.join(names)}"
+        raise LogError("no file of labels", where=path, remedy=remedy)
     endings = IMAGES | {NPY} | _formats().keys()
     files = [path] if path.is_file() else list_files(path, endings, below=True)
     problems: list[LogError] = []
@@ -105,7 +103,8 @@ def _formats() -> dict[str, list[LabelFormat]]:
 def _parse(file: Path) -> Any:
     """Parse a file by its ending; a `LogError` if it is damaged, or beyond a limit."""
     try:
-        content = read_bounded(file, GREATEST)
+        with reading(file, LogError):
+            content = read_bounded(file, GREATEST)
         match file.suffix.lower():
             case ".json":
                 return read_json(content, VALUES, shown=False, most=GREATEST)
@@ -116,8 +115,6 @@ def _parse(file: Path) -> Any:
                 return fromstring(content, XMLParser(encoding="utf-8"))
             case _:
                 return content.decode()
-    except OSError as error:
-        raise LogError(error.strerror or str(error), where=file) from error
     except (ValueError, ParseError) as error:
         reason = str(error)
         if isinstance(error, ParseError):

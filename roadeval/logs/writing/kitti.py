@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data.arrays import Image, Matrix
+from roadeval.data.arrays import Floats, Image
 from roadeval.images.decoding import size_of, to_rgb
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import LogError
@@ -62,7 +62,7 @@ def messages(folder: Path, name: str, image: bytes, frame_id: str) -> Iterator[t
     yield "/tf_static", FrameTransform(**pose)
 
 
-def _read_matrices(file: Path) -> Iterator[Matrix]:
+def _read_matrices(file: Path) -> Iterator[Floats]:
     """Yield the matrices of `_SHAPES`; a `LogError` if one is missing, or impossible."""
     with reading(file, LogError):
         lines = file.read_text(errors="replace").splitlines()

@@ -39,7 +39,7 @@ from roadeval.logs.files import (
 from roadeval.logs.messages.pictures import turn_of
 from roadeval.logs.settings import NS
 from roadeval.logs.writing import kitti
-from roadeval.runtime.files import NewFile, check_input, writing
+from roadeval.runtime.files import NewFile, check_input, reading, writing
 from roadeval.version import VERSION
 
 FRAME_ID: Final = "camera"
@@ -176,6 +176,7 @@ def _schema_of(kind: Any) -> Schema:
 
 ROOT: Final = "/roadeval"
 METRICS: Final = "roadeval.Metrics"
+_COUNTS: Final = ("TP", "TN", "FP", "FN", "N")
 _INTEGER: Final = {"type": "integer"}
 _RATE: Final = {"type": ["number", "null"], "description": "a fraction; null if undefined"}
 
@@ -205,23 +206,17 @@ class SidecarWriter(LogWriter):
             palette = np.zeros((256, 4), np.uint8)
             for label in errors.spec.classes:
                 palette[label.value] = label.rgba
-            images[f"{root}/{name}/{errors.spec.name}"] = palette[
-                np.asarray(errors.array, np.uint8)
-            ]
+            codes = np.asarray(errors.array, np.uint8)
+            images[f"{root}/{name}/{errors.spec.name}"] = palette[codes]
         for topic, image in images.items():
             self.mask(topic, stamp, image, log_time_ns=log_time, frame_id=frame_id or FRAME_ID)
         for tally in result.tallies:
-            counts = tally.counts
             message: dict[str, Any] = {
                 "timestamp": {"sec": stamp // NS, "nsec": stamp % NS},
                 "frame": frame.number,
                 "variant": tally.variant,
                 "stage": tally.stage,
-                "TP": counts.tp,
-                "TN": counts.tn,
-                "FP": counts.fp,
-                "FN": counts.fn,
-                "N": counts.n,
+                **{name: getattr(tally.counts, name.lower()) for name in _COUNTS},
                 **{name: None if math.isnan(rate) else rate for name, rate in tally.rates.items()},
             }
             data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
@@ -233,7 +228,7 @@ class SidecarWriter(LogWriter):
 def _metrics_schema(rates: tuple[str, ...]) -> Schema:
     """Return the JSON Schema of the metrics, with Foxglove's form of a time."""
     time = {"type": "object", "title": "time", "properties": {"sec": _INTEGER, "nsec": _INTEGER}}
-    counts = dict.fromkeys(("frame", "TP", "TN", "FP", "FN", "N"), _INTEGER)
+    counts = dict.fromkeys(("frame", *_COUNTS), _INTEGER)
     properties = {"timestamp": time, "variant": {"type": "string"}, "stage": {"type": "string"}}
     properties |= counts | dict.fromkeys(rates, _RATE)
     text = json.dumps({"title": METRICS, "type": "object", "properties": properties})
@@ -393,23 +388,20 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
 def _image(file: Path, *, is_label: bool = False, of_kitti: bool = False) -> tuple[bytes, str]:
     """Read a JPEG or PNG file with any ending; a label must not be a JPEG."""
     try:
-        check_input(file)
-        data = file.read_bytes()
+        with reading(file, LogError):
+            check_input(file)
+            data = file.read_bytes()
         size_of(data, Limits())
         format_ = format_of(data)
         assert format_ is not None
         if is_label and not format_.exact:
-            raise LogError(
-                f"{format_.name} changes label values", where=file, remedy="masks must be lossless"
-            )
+            problem, remedy = f"{format_.name} changes label values", "masks must be lossless"
+            raise LogError(problem, where=file, remedy=remedy)
         if format_.media_type is None:
-            raise LogError(
-                f"{format_.name}, which not all viewers know: save it as PNG", where=file
-            )
+            problem = f"{format_.name}, which not all viewers know: save it as PNG"
+            raise LogError(problem, where=file)
         if of_kitti:
             return png_of(kitti.road_mask(data)), "png"
         return data, format_.media_type.removeprefix("image/")
-    except OSError as error:
-        raise LogError(str(error.strerror), where=file) from error
     except ImageError as error:
         raise LogError.of(error, file) from error

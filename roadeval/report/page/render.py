@@ -48,27 +48,24 @@ def page(document: Report) -> bytes:
     frames = range_of_frames(part for part in parts if isinstance(part, Chart))
     browsers = (part for part in parts if isinstance(part, FrameBrowser))
     variants = next((part.variants for part in browsers), ())
-    html = (
-        _environment()
-        .get_template("page.html")
-        .render(
-            doc=document,
-            sections=sections(document.blocks),
-            policy=POLICY.format(_hash(style()), _hash(script())),
-            style=style(),
-            script=script(),
-            place_chart=lambda chart: place_chart(chart, frames),
-            legend=legend,
-            caption=caption,
-            values=values,
-            source=_source,
-            rows_of=_rows,
-            variants=variants,
-            variant_of=partial(_variant_of, variants),
-            unknown=_unknown,
-        )
+    template = _environment().get_template("page.html")
+    html = template.render(
+        doc=document,
+        sections=sections(document.blocks),
+        policy=POLICY.format(_hash(style()), _hash(script())),
+        style=style(),
+        script=script(),
+        place_chart=lambda chart: place_chart(chart, frames),
+        legend=legend,
+        caption=caption,
+        values=values,
+        source=_source,
+        rows_of=_rows,
+        variants=variants,
+        variant_of=partial(_variant_of, variants),
+        unknown=_unknown,
     )
-    return str(html).encode("utf-8")
+    return html.encode("utf-8")
 
 
 @cache

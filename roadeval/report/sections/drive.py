@@ -177,11 +177,8 @@ def stages(findings: Findings) -> Iterator[Block]:
         ],
     )
     both = {FILTERED, UNFILTERED} <= findings.facts.totals.keys()
-    yield note(
-        "error parts with the filter" if both else "error parts",
-        filtered=FILTERED,
-        unfiltered=UNFILTERED,
-    )
+    name = "error parts with the filter" if both else "error parts"
+    yield note(name, filtered=FILTERED, unfiltered=UNFILTERED)
     numbers: list[Block] = [stages_table(findings.facts.totals, findings.changes)]
     if findings.changes:
         numbers.append(note("repaired and spoiled"))
@@ -227,12 +224,9 @@ def _perfect_filter(findings: Findings, oracles: Sequence[Mapping[str, Any]]) ->
         is_filter = row["oracle"] not in findings.facts.totals[FILTERED]
         if row["variant"] == FILTERED and is_filter and row["frames"] == without["frames"]:
             helps = row[TESTED] <= without[TESTED]
-            yield note(
-                "perfect filter",
-                perfect=percent(row[TESTED]),
-                without=percent(without[TESTED]),
-                meaning=caption("perfect filter helps" if helps else "perfect filter harms"),
-            )
+            meaning = caption("perfect filter helps" if helps else "perfect filter harms")
+            errors = {"perfect": percent(row[TESTED]), "without": percent(without[TESTED])}
+            yield note("perfect filter", **errors, meaning=meaning)
 
 
 def _heat_maps(maps: Mapping[str, Floats]) -> ImageGrid:
@@ -258,14 +252,9 @@ def thresholds(findings: Findings) -> Iterator[Block]:
     if not curves or not len(levels):
         return
     yield Heading("Over thresholds")
-    chart = Figure(
-        [
-            charts.precision_over_recall(levels, findings.facts.totals),
-            charts.reliability(levels, findings.facts.totals),
-        ],
-        caption("curves"),
-    )
-    table = thresholds_table(curves, findings.facts.totals)
+    totals = findings.facts.totals
+    drawn = [charts.precision_over_recall(levels, totals), charts.reliability(levels, totals)]
+    chart, table = Figure(drawn, caption("curves")), thresholds_table(curves, totals)
     blocks = [chart, table, note("meaning of thresholds")]
     yield Details("Precision, recall and MaxF", blocks)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from os.path import relpath
 from pathlib import Path
@@ -19,7 +19,6 @@ from roadeval.evaluation.score.scoreboard import BASES, Effect
 from roadeval.evaluation.tables import finals, group_rows, only, values_of
 from roadeval.report.blocks import (
     Block,
-    Cell,
     Details,
     DriveRow,
     Heading,
@@ -155,19 +154,16 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     A table of so many ``worst`` drives, with the highest ERR, has no state and no group.
     """
     scores, rows = findings.focus_scores, findings.drives
-    lines = {
-        drive.drive: ", ".join(f"{key}: {value}" for key, value in drive.tags.items())
-        for drive in findings.facts.drives
-    }
-    tags = {
-        drive: text if len(text) <= TAGS else f"{text[: TAGS - 1]}\N{HORIZONTAL ELLIPSIS}"
-        for drive, text in lines.items()
-    }
+    tags = {}
+    for drive in findings.facts.drives:
+        text = ", ".join(f"{key}: {value}" for key, value in drive.tags.items())
+        cut = f"{text[: TAGS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        tags[drive.drive] = text if len(text) <= TAGS else cut
     if worst is not None:
         ranked = scores[TESTED].dropna().sort_index().sort_values(ascending=False, kind="stable")
         rows = rows.loc[ranked.index[:worst]]
     scores = scores.reindex(rows.index)
-    columns: dict[str, Sequence[Cell | str]] = {
+    columns: dict[str, list[str]] = {
         "drive": [findings.names[drive] for drive in rows.index],
         "state": rows["status"].tolist(),
         "group": rows["group"].astype(object).fillna("").tolist(),

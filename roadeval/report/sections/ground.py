@@ -165,13 +165,8 @@ def _end(row: Measure, *, posed: bool) -> tuple[str, str, str, str]:
     unsure = posed and defined(row["value"]) and _sway(row) > abs(row["value"])
     ends = (_metres(row[end]) for end in ("low", "high"))
     span = " to ".join(ends) if defined(row["low"]) else DASH
-    size = _metres(row["p95"]).lstrip("+")
-    return (
-        f"{UNSURE * unsure}{_metres(row['value'])}",
-        span,
-        size,
-        f"{row['missing']} of {row['frames']}",
-    )
+    median, size = f"{UNSURE * unsure}{_metres(row['value'])}", _metres(row["p95"]).lstrip("+")
+    return median, span, size, f"{row['missing']} of {row['frames']}"
 
 
 def _metres(value: float) -> str:

@@ -73,8 +73,7 @@ class ChartView {
       pointAt(this, x);
       if (begin !== null) this.select(begin, x);
     });
-    area.addEventListener("pointerleave", () => pointAt(this, null));
-    area.addEventListener("blur", () => pointAt(this, null));
+    for (const end of ["pointerleave", "blur"]) area.addEventListener(end, () => pointAt(this, null));
     area.addEventListener("keydown", (event) => this.key(event, onFrame));
     if (!this.values.frames) return;
     area.addEventListener("pointerdown", (event) => {

@@ -333,9 +333,7 @@ function narrowRates(table, words, countsOf) {
 }
 
 function hasCondition(row, condition) {
-  if (!condition) return true;
-  if (condition === "pictured") return row.classList.contains("pictured");
-  return (row.dataset.conditions ?? "").split(" ").includes(condition);
+  return !condition || row.classList.contains(condition) || (row.dataset.conditions ?? "").split(" ").includes(condition);
 }
 
 /** Scroll a row into sight within its table, and leave the page where it is. */

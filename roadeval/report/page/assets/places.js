@@ -24,8 +24,7 @@ class RowsView {
       row.marks = [...row.querySelectorAll("[data-text]")].map((mark) => [mark.dataset.text, mark]);
       row.addEventListener("pointermove", () => this.point(number));
     }
-    element.addEventListener("pointerleave", () => this.point(null));
-    element.addEventListener("blur", () => this.point(null));
+    for (const end of ["pointerleave", "blur"]) element.addEventListener(end, () => this.point(null));
     element.addEventListener("keydown", (event) => this.key(event));
   }
 

@@ -23,12 +23,9 @@ const isEmpty = (text) => ["", "\u2013", "none given"].includes(text.trim());
 function sort(table, column, descending) {
   const body = table.tBodies[0];
   const text = (row) => row.cells[column].textContent;
-  const rows = [...body.rows];
-  const totals = rows.filter((row) => row.classList.contains("total"));
-  const others = rows.filter((row) => !row.classList.contains("total"));
-  const filled = others.filter((row) => !isEmpty(text(row)));
-  filled.sort((a, b) => (descending ? -1 : 1) * compare(text(a), text(b)));
-  body.append(...filled, ...others.filter((row) => isEmpty(text(row))), ...totals);
+  const rank = (row) => (row.classList.contains("total") ? 2 : Number(isEmpty(text(row))));
+  const order = (a, b) => rank(a) - rank(b) || (rank(a) ? 0 : (descending ? -1 : 1) * compare(text(a), text(b)));
+  body.append(...[...body.rows].sort(order));
   for (const row of body.querySelectorAll(".rule:not(.total)")) row.classList.remove("rule");
   table.classList.add("sorted");
 }
