@@ -79,15 +79,17 @@ class History:
 
     @property
     def last_good(self) -> RunFacts:
-        """The newest run that no standing event has made worse."""
-        return self.runs[min((event.run for event in self.standing), default=len(self.runs)) - 1]
+        """The newest run that was scored and that no standing event has made worse."""
+        before = self.runs[: min((event.run for event in self.standing), default=len(self.runs))]
+        return ([run for run in before if run.drives] or before)[-1]
 
 
 def _stands(change: Change, focus: str) -> bool:
     line, step, rise = change.line, change.step, change.difference.mean
-    since = line.levels[-1] - line.levels[step.run - 1]
+    # Of steps, as single runs are noisy, and the last one may have no level.
+    since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
     is_level = (line.variant, line.kind) == (focus, ALL) and step.kind != "outlier"
-    return bool(is_level and rise > 0 and since > rise / 2)
+    return bool(is_level and rise > 0 and since > step.change / 2)
 
 
 def group_changes(changes: Sequence[Change], focus: str) -> list[Event]:
@@ -137,7 +139,7 @@ def verdict(history: History) -> str:
         there = max((sum(map(defined, line.rates.tolist())) for line in masks), default=0)
         if there < 2:
             return f"{focus} is in {there} of {count}, which tells no change."
-        return f"{focus} did not change in {counted(there, 'run')}."
+        return f"No change of {focus} in {counted(there, 'run')} is more than chance may do."
     standing = history.standing
     ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or of_focus[-1:]
     first = ranked[0].first

@@ -81,6 +81,7 @@ def test_the_last_run_is_guarded_and_the_last_good_one_is_a_base(nights, tmp_pat
         (("{nights}", "--by", "build"), 1, "has no label build"),
         (("{nights}", "--fail-if", "ERR"), 2, "is no condition"),
         (("{nights}", "-o", "x.txt"), 2, "end it in"),
+        (("{nights}", "-o", "{nights}/03/summary.json"), 1, "is an input"),
     ],
 )
 def test_a_wrong_command_is_told_in_a_line(words, code, message, nights, tmp_path):

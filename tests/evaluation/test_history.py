@@ -118,6 +118,10 @@ def test_the_last_run_is_judged_against_the_mean_of_those_before():
     # The noise of the runs before is in the interval.
     assert not surely.holds
     assert surely.low < change.value - 0.001
+    # Runs that are not there make nothing surer.
+    assert judged(rows, surely.condition.text, last=99) == judged(
+        rows, surely.condition.text, last=11
+    )
 
 
 def test_a_condition_on_what_is_not_there_is_not_judged():

@@ -3,14 +3,16 @@
 import json
 import os
 import shutil
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from roadeval import compare
 from roadeval.errors import RoadevalError
 from roadeval.jobs.results.history import find_results, history, write
 from roadeval.results.history import verdict
-from tests.results.fleet.making import SCORED, fleet_of
+from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
 DAY = 86_400
 
@@ -107,3 +109,40 @@ def test_the_base_of_a_comparison_is_the_last_good_run_of_a_folder(made, nights)
     compared = compare([nights, nights / "7"])
     assert [result.label for result in compared.comparison.results] == ["4", "7"]
     assert compared.content["changed"]
+
+
+def test_a_last_run_without_numbers_neither_undoes_a_step_nor_is_good(nights, tmp_path):
+    folder = shutil.copytree(nights, tmp_path / "nights")
+    (folder / "7" / "scores.parquet").write_bytes(b"PAR1")
+    made = history(folder, fail_if=["post.filtered.ERR > +1pp"])
+    assert verdict(made).endswith("No later run has undone it.")
+    assert made.last_good.paths == (str(folder / "4"),)
+    assert made.judgements[0].why.endswith("there are none")
+    assert replace(made, events=[]).last_good.paths == (str(folder / "6"),)
+    shutil.rmtree(folder / "7")
+    fleet_of(folder / "7", 6, status=lambda _: UNSCORED)
+    assert verdict(history(folder)) == verdict(made)
+
+
+def test_whether_a_rise_stands_is_no_matter_of_the_last_run_alone(made):
+    (event,) = made.events
+    line = event.first.line
+    noisy = line._replace(levels=line.levels - 0.02 * (np.arange(8) == 7))
+    change = event.first._replace(line=noisy)
+    assert replace(made, events=[replace(event, changes=[change])]).last_good == made.runs[4]
+
+
+def test_two_runs_that_differ_are_not_called_equal(nights):
+    assert "chance" in verdict(history([nights / "4", nights / "5"]))
+
+
+def test_times_that_are_none_put_a_run_first_or_last(nights, tmp_path):
+    folder = shutil.copytree(nights, tmp_path / "nights")
+    for night, made_ns in (("2", -(10**30)), ("3", 10**30)):
+        summary = folder / night / "fleet.json"
+        content = json.loads(summary.read_text())
+        content["origin"]["made_ns"] = made_ns
+        summary.write_text(json.dumps(content))
+    runs = history(folder).runs
+    assert [run.title[:4] for run in (runs[0], runs[-1])] == ["1970", "2262"]
+    assert [run.origin.commit[0] for run in runs] == [*"20145673"]

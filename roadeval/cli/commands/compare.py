@@ -68,13 +68,14 @@ def compare(
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
     from roadeval.jobs.results import compare as comparing
+    from roadeval.jobs.results.history import list_results
 
     options = [f"--variant={name}" for name in variant or ()]
     options += [f"--fail-if={condition}" for condition in fail_if or ()]
     typed = shlex.join(["roadeval", "compare", *map(str, results), *options])
     files = [(path, "") for path in output or ()]
     files += [(path, kind) for path, kind in ((junit, "junit"), (markdown, "comment")) if path]
-    with holding(*(path for path, _ in files), inputs=results):
+    with holding(*(path for path, _ in files), inputs=list_results(results)):
         compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
         for path, kind in files:
             comparing.write(compared, path, kind, typed)

@@ -232,7 +232,7 @@ def judge_last(
         line = next((mask for mask in masks if mask.name == name), None)
         if line is None or np.isnan(line.rates[-1]):
             names = ", ".join(mask.name for mask in masks if not np.isnan(mask.rates[-1]))
-            yield condition.not_judged(label, f"it has no {name}; there are {names}")
+            yield condition.not_judged(label, f"it has no {name}; there are {names or 'none'}")
             continue
         end = len(line.rates) - 1
         runs = range(max(end - earlier, 0), end), range(end, end + 1)
@@ -242,7 +242,7 @@ def judge_last(
             yield condition.not_judged(label, why)
             continue
         if difference.low is not None and difference.high is not None:
-            noise = 2 * line.noise * math.sqrt(1 + 1 / earlier)
+            noise = 2 * line.noise * math.sqrt(1 + 1 / len(runs[0]))
             ends = (difference.mean - difference.low, difference.high - difference.mean)
             low, high = (math.hypot(end, noise) for end in ends)
             mean = difference.mean

@@ -90,9 +90,8 @@ def history(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     lost: list[str] = []
-    paths = [path for given in list_paths(results) for path in find_results(local_path(given))]
     opened: dict[Path, Result] = {}
-    for path in paths:
+    for path in list_results(results):
         try:
             opened[path] = Result(path)
             if not opened[path].complete:
@@ -110,7 +109,7 @@ def history(
     masks = rows[~rows.duplicated(["run", *KEY])].groupby("run")["frames"].agg(["size", "sum"])
     sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
-    newest = Result(runs[-1].paths[0]).facts
+    newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
     settings, focus = newest.evaluation, newest.focus or ""
     tags = {str(name): str(name)[len(TAG) :] for name in rows if str(name).startswith(TAG)}
     lines = find_lines(rows, tags, len(runs))
@@ -124,6 +123,11 @@ def history(
         event.frames.extend(_changed_frames(read, event))
     judged = judge_last(lines, conditions, last, settings, within)
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
+
+
+def list_results(results: Paths) -> list[Path]:
+    """Return the paths of results, and of those below folders."""
+    return [path for given in list_paths(results) for path in find_results(local_path(given))]
 
 
 def find_results(path: Path) -> list[Path]:
@@ -183,6 +187,7 @@ def _origin(result: Result, path: Path) -> Origin:
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
     made_ns = origin.made_ns or file.stat().st_mtime_ns
     labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+    made_ns = min(max(made_ns, 0), 2**63 - 1)  # others are no times
     return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
 
 
