@@ -44,7 +44,8 @@ def made(nights):
 def test_the_run_that_is_worse_is_named_with_what_changed(made):
     (event,) = made.events
     assert event.run == 5
-    assert event.first.line.name == "post.filtered.ERR"
+    line = event.first.line
+    assert (line.variant, line.stage, line.kind, line.rate) == ("filtered", "post", "all", "ERR")
     assert sorted(event.first.drives["drive"][:2]) == ["drive_0000-00000000", "drive_0003-00000003"]
     assert event.reasons == ["commit 444444444444 to 555555555555", "svm.C 1 to 2"]
     assert {drive for drive, _, _ in event.frames} == set(event.first.drives["drive"][:2])

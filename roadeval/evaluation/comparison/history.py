@@ -62,11 +62,6 @@ class Line(NamedTuple):
     drives: pd.DataFrame
     """The name and the group of each drive, and its camera."""
 
-    @property
-    def name(self) -> str:
-        """Its name in a condition, if it is of all pixels."""
-        return f"{self.stage}.{self.variant}.{self.rate}"
-
 
 class Change(NamedTuple):
     """A step of a line, and the drives that carry it."""
@@ -226,13 +221,17 @@ def judge_last(
 
     Its interval is widened by the noise of a run.
     """
-    label, masks = "the last run", [line for line in lines if line.kind == ALL]
+    label = "the last run"
+    masks = {
+        f"{line.stage}.{line.variant}.{line.rate}": line
+        for line in lines
+        if line.kind == ALL and not np.isnan(line.rates[-1])
+    }
     for condition in conditions:
         name = f"{condition.stage}.{condition.variant}.{condition.rate}"
-        line = next((mask for mask in masks if mask.name == name), None)
-        if line is None or np.isnan(line.rates[-1]):
-            names = ", ".join(mask.name for mask in masks if not np.isnan(mask.rates[-1]))
-            yield condition.not_judged(label, f"it has no {name}; there are {names or 'none'}")
+        if (line := masks.get(name)) is None:
+            why = f"it has no {name}; there are {', '.join(masks) or 'none'}"
+            yield condition.not_judged(label, why)
             continue
         end = len(line.rates) - 1
         runs = range(max(end - earlier, 0), end), range(end, end + 1)
