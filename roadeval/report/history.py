@@ -116,7 +116,7 @@ def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
         for step in line.steps:
             look = Look(WORSE if step.change > 0 else FAINT, mark="triangle")
             title_of_step = f"{step.kind} of {line.variant}, {names[step.run]}"
-            series.append(Series(title_of_step, look, [step.run], [level[step.run]]))
+            series.insert(0, Series(title_of_step, look, [step.run], [level[step.run]]))
     return Chart(title, ChartKind.LINES, series, names=names, from_zero=False)
 
 

@@ -11,6 +11,8 @@ import pytest
 from roadeval import compare
 from roadeval.errors import RoadevalError
 from roadeval.jobs.results.history import find_results, history, write
+from roadeval.report.blocks import Figure
+from roadeval.report.history import document
 from roadeval.results.history import verdict
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
@@ -147,3 +149,10 @@ def test_times_that_are_none_put_a_run_first_or_last(nights, tmp_path):
     runs = history(folder).runs
     assert [run.title[:4] for run in (runs[0], runs[-1])] == ["1970", "2262"]
     assert [run.origin.commit[0] for run in runs] == [*"20145673"]
+
+
+def test_the_mark_of_a_step_lies_over_its_line(made):
+    figure = next(block for block in document(made).blocks if isinstance(block, Figure))
+    # Charts draw their first series last.
+    names = [series.name for series in figure.charts[0].series]
+    assert names.index("step of filtered, 1972-10-02") < names.index("filtered")
