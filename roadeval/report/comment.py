@@ -16,6 +16,7 @@ from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Block, blocks_as_markdown
 from roadeval.report.chart import BETTER, WORSE
+from roadeval.results.facts import focus_of
 from roadeval.results.sentences import is_sure
 from roadeval.runtime.text import elide
 
@@ -78,11 +79,16 @@ def _mermaid(kind: str, height: int, colours: Sequence[str], *lines: str) -> str
 
 
 def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskChange, str, str]:
-    """Return the final mask that is surely worst, its ERR, and whether it is better or worse."""
+    """Return a mask that is surely worse, else the focus, with its ERR and how it changed."""
     masks = comparison.finals() or comparison.changes
-    by_mask = [(is_sure(row.difference[TESTED]), row) for row in masks]
-    sure, mask = max(by_mask, key=lambda pair: (pair[0], pair[1].difference[TESTED].mean))
-    mean = mask.difference[TESTED].mean
+    focus = focus_of([row.variant for row in masks])
+
+    def rank(row: MaskChange) -> tuple[bool, bool, float]:
+        change = row.difference[TESTED]
+        return is_sure(change) and change.mean > 0, row.variant == focus, change.mean
+
+    mask = max(masks, key=rank)
+    sure, mean = is_sure(mask.difference[TESTED]), mask.difference[TESTED].mean
     failed = any(limit.holds is not False for limit in limits) or (sure and mean > 0)
     tone = "better" if sure else "may be chance" if mean else "unchanged"
     text = f"{mask.variant}: {percent(mask.new[TESTED], 1)} % ({plain_points(mean, 1)} pp)"

@@ -190,7 +190,8 @@ def _positions(chart: Chart, frames: AxisRange | None) -> tuple[AxisRange, list[
         return x, _number_ticks(x)
     x = AxisRange(-0.3, len(chart.names) - 0.7)
     # Many names, as those of runs, do not fit beside each other.
-    step = -(-len(chart.names) // 3) if len(chart.names) > _X_TICKS else 1
+    room = max(34 // max(map(len, chart.names), default=1), 1)
+    step = -(-len(chart.names) // room) if len(chart.names) > _X_TICKS else 1
     shown = range(0, len(chart.names), step)
     return x, [(x.percent(position), chart.names[position]) for position in shown]
 

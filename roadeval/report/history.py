@@ -33,11 +33,12 @@ Rows = list[list[Cell | str]]
 def document(history: History) -> blocks.Report:
     """Return a history as a document."""
     runs = history.runs
+    drives = counted(runs[-1].drives, "drive")
     lost = [BulletList("Left out", history.lost, "warning")] if history.lost else []
     return blocks.Report(
         kicker="roadeval history",
         title=f"{counted(len(runs), 'run')}: {history.focus}",
-        subtitle=f"{runs[0].title} to {runs[-1].title}, {counted(runs[-1].drives, 'drive')} last",
+        subtitle=f"{runs[0].title} to {runs[-1].title}, {drives} in the last",
         footer=f"history of {history.focus}",
         blocks=[
             Heading("Since when"),

@@ -48,7 +48,10 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
     """
     lines = []
     for label, settings in comparison.changed_settings.items():
-        named = [f"{name} {setting(a)} to {setting(b)}" for name, (a, b) in settings.items()]
+        # What a user brought comes first.
+        names = sorted(settings, key=lambda name: not name.startswith(("code of ", "network ")))
+        pairs = [(name, *map(setting, settings[name])) for name in names]
+        named = [f"{name} {before} to {after}" for name, before, after in pairs]
         more = f"; and {len(named) - most} more" if most and len(named) > most else ""
         of = f" in {label}" if len(comparison.results) > 2 else ""
         lines.append(f"Changed settings{of}: {'; '.join(named[:most])}{more}.")

@@ -88,7 +88,7 @@ def _stands(change: Change, focus: str) -> bool:
     line, step, rise = change.line, change.step, change.difference.mean
     # Of steps, as single runs are noisy, and the last one may have no level.
     since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
-    is_level = (line.variant, line.kind) == (focus, ALL) and step.kind != "outlier"
+    is_level = line.title == TESTED and line.variant == focus and step.kind != "outlier"
     return bool(is_level and rise > 0 and since > step.change / 2)
 
 
@@ -141,7 +141,9 @@ def verdict(history: History) -> str:
             return f"{focus} is in {there} of {count}, which tells no change."
         return f"No change of {focus} in {counted(there, 'run')} is more than chance may do."
     standing = history.standing
-    ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or of_focus[-1:]
+    ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or [
+        max(of_focus, key=lambda e: e.run)
+    ]
     first = ranked[0].first
     text = describe_change(first, f" in the run of {history.runs[ranked[0].run].name}")
     parts = [c for c in ranked[0].changes if c.line.kind != ALL and c.line.variant == focus]

@@ -89,6 +89,25 @@ def test_a_tag_is_a_line_of_its_drives_alone():
     assert (step.run, step.change) == (7, pytest.approx(0.02))
 
 
+def test_a_run_that_stands_out_is_no_part_of_the_level_beside_it():
+    def added(run, drive):
+        return 0.1 * (run == 4) + 0.02 * (run >= 7)
+
+    line = lines_of(rows_of(added))[ERR]
+    changes = find_changes([line], 0.95, no_frames)
+    assert [change.step.kind for change in changes] == ["outlier", "step"]
+    assert [change.difference.mean for change in changes] == pytest.approx([0.1, 0.02])
+    assert changes[1].difference.worse == 8
+
+
+def test_no_level_is_below_zero():
+    def easy_drives_come(run, drive):
+        return math.nan if drive in "fgh" and run < 6 else 0.08 * (drive in "abcde" and run >= 6)
+
+    line = lines_of(rows_of(easy_drives_come, runs=RUNS))[ERR]
+    assert line.levels.min() >= 0
+
+
 def test_drives_of_a_group_count_as_one():
     def group(run, drive):
         return "pair" if drive in "ab" else drive

@@ -14,6 +14,7 @@ from roadeval.jobs.results.history import find_results, history, write
 from roadeval.report.blocks import Figure
 from roadeval.report.history import document
 from roadeval.results.history import verdict
+from roadeval.results.tables import read_parquet, write_parquet
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
 DAY = 86_400
@@ -75,6 +76,21 @@ def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path)
     assert len(made.lost) == 2
     assert "whose format is no longer read" in made.lost[0]
     assert "scores.parquet: damaged" in made.lost[1]
+
+
+def test_two_logs_of_one_name_in_a_run_are_told(nights, tmp_path):
+    folder = shutil.copytree(nights, tmp_path / "nights")
+    fleet_of(tmp_path / "other", 6, seed=5, status=lambda _: SCORED)
+    origin = json.loads((folder / "7" / "fleet.json").read_text())["origin"]
+    shutil.copytree(tmp_path / "other", folder / "8")
+    table = read_parquet([folder / "8" / "drives.parquet"], "drives").assign(log_digest="another")
+    write_parquet({folder / "8" / "drives.parquet": ("drives", table)})
+    summary = folder / "8" / "fleet.json"
+    content = json.loads(summary.read_text()) | {"origin": origin}
+    summary.write_text(json.dumps(content))
+    made = history(folder, by="build")
+    assert len(made.lost) == 6
+    assert "two logs of a run are called drive_0000-00000000" in made.lost[0]
 
 
 def test_recordings_and_folders_of_one_run_are_not_taken_twice(nights, tmp_path):

@@ -131,6 +131,7 @@ def _line(
     ends = np.zeros((0, count))
     if rate == TESTED and kind == ALL:
         ends = _ends(values, drives, steps, levels)
+    levels = np.clip(levels, 0, 1)  # other drives may have had lower rates
     return Line(*about, rates, levels, ends, noise, tuple(steps), values, drives)
 
 
@@ -199,7 +200,10 @@ def _difference(
     """Return the change over the drives that are in some of both runs, and these drives."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a drive that is in none of the runs
-        old, new = (np.nanmean(line.drive_rates[[*runs]], axis=0) for runs in (before, after))
+        # A run that stands out says nothing of the level beside it.
+        out = {step.run for step in line.steps if step.kind == "outlier"}
+        sides = ([run for run in runs if run not in out] or runs for runs in (before, after))
+        old, new = (np.nanmean(line.drive_rates[[*runs]], axis=0) for runs in sides)
     # Means of equal numbers may differ in their last digit.
     rows = line.drives.assign(before=old, after=new, mean=(new - old).round(12))
     rows = rows[rows["mean"].notna()]

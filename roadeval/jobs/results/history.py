@@ -104,9 +104,16 @@ def history(
         remedy = lost[0] if lost else ""
         problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
         raise RoadevalError(problem, remedy=remedy)
-    numbered = [(n, opened[Path(path)]) for n, run in enumerate(runs) for path in run.paths]
+    run_of = np.array([n for n, run in enumerate(runs) for _ in run.paths])
+    numbered = [*enumerate(opened[Path(path)] for run in runs for path in run.paths)]
     rows = _read_rows(numbered, lost, on_progress)
-    masks = rows[~rows.duplicated(["run", *KEY])].groupby("run")["frames"].agg(["size", "sum"])
+    rows = rows.assign(run=run_of[rows["run"]])
+    key = ["run", *KEY]
+    logs = rows[[*key, "log_digest"]].drop_duplicates()
+    names = logs[logs.duplicated(key)]["drive"].unique()
+    lost += [f"two logs of a run are called {name}: only the later result counts" for name in names]
+    rows = rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
+    masks = rows[~rows.duplicated(key)].groupby("run")["frames"].agg(["size", "sum"])
     sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
     newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
@@ -194,7 +201,7 @@ def _origin(result: Result, path: Path) -> Origin:
 def _read_rows(
     numbered: Sequence[tuple[int, Result]], lost: list[str], on_progress: OnProgress
 ) -> pd.DataFrame:
-    """Return the rows of some results for `find_lines`, by the number of their run."""
+    """Return the rows of some results for `find_lines`, by the numbers of these."""
     fleets = [one for one in numbered if one[1].fleet]
     batches = [fleets[begin : begin + BATCH] for begin in range(0, len(fleets), BATCH)]
     batches += [[one] for one in numbered if not one[1].fleet]
@@ -234,7 +241,7 @@ def _read_batch(
 
 
 def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows for `find_lines` from tables of all runs."""
+    """Return the rows for `find_lines` from tables of all results, whose number is ``run``."""
     key = ["run", *KEY]
     is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
     classes = classes[is_class & (classes["pixels"] > 0)]
@@ -252,9 +259,7 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     names = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *RATES]
     parts = [part.reindex(columns=names) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
-    rows = rows.merge(about, on=key)
-    # Of a drive that a run has twice the later result counts.
-    return rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
+    return rows.merge(about, on=key)
 
 
 def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> pd.DataFrame:
