@@ -19,12 +19,7 @@ class RoadevalError(Exception):
     """
 
     def __init__(
-        self,
-        problem: str = "",
-        *,
-        where: object = "",
-        setting: str = "",
-        remedy: str = "",
+        self, problem: str = "", *, where: object = "", setting: str = "", remedy: str = ""
     ) -> None:
         super().__init__(problem)
         self.problem = problem

@@ -24,15 +24,7 @@ from roadeval.data.frame import (
     TruthClass,
 )
 from roadeval.data.histogram import CERTAIN, CODES, best_code, histogram, wrong_above
-from roadeval.data.layer import (
-    ERRORS,
-    TRUTH,
-    LabelClass,
-    Layer,
-    LayerKind,
-    LayerSpec,
-    mask_spec,
-)
+from roadeval.data.layer import ERRORS, TRUTH, LabelClass, Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.data.result import (
     BASELINE,
     FILTERED,

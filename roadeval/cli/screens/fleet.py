@@ -48,10 +48,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
         blocks += disturbances.brief(facts)
         blocks += why(facts)
         worst = drives_table(FleetFolder(outcome.folder), WORST)
-        tables.show(
-            [*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst],
-            out,
-        )
+        tables.show([*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst], out)
         out.print()
     folder = str(console.from_here(outcome.folder))
     out.print(f"results    {folder}{os.sep}", soft_wrap=True)

@@ -29,7 +29,7 @@ from roadeval.evaluation.tables import KEY, MASK, concatenate, finals, most_chan
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
-from roadeval.report.writing import write_document
+from roadeval.report.pdf.typeset import write_document
 from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
 from roadeval.results.history import Event, History, RunFacts, as_dict, group_changes
 from roadeval.results.schema import TAG

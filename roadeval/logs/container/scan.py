@@ -23,35 +23,8 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.records import (
-    BLOCK,
-    CHUNK,
-    COMPRESSIONS,
-    DEFINITIONS,
-    DOUBTED,
-    HEAD,
-    LARGEST,
-    MAGIC,
-    MESSAGE,
-    MESSAGE_HEAD,
-    MESSAGE_INDEX,
-    PADDING,
-    PRIVATE,
-    Bytes,
-    Chunk,
-    ChunkReader,
-    Entries,
-    FileBytes,
-    Message,
-    Record,
-    message_at,
-    parse,
-    parse_chunk,
-    parse_message_index,
-    read_summary,
-    record_at,
-    walk,
-)
+from roadeval.logs.container import records
+from roadeval.logs.container.records import CHUNK, HEAD, MAGIC, MESSAGE, MESSAGE_HEAD, Record
 from roadeval.logs.errors import BadRecord
 
 END: Final = -1
@@ -63,12 +36,12 @@ _CANDIDATE: Final = re.compile(
 )
 """The head of a record that is shorter than 4 GiB or was never ended, or a log's first bytes."""
 _HEADS: Final = HEAD.size + MESSAGE_HEAD.size
-_NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
+_NOT_IN_CHUNKS: Final = (CHUNK, records.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that never lie inside a chunk, unlike messages and their descriptions."""
 RECORDS: Final = 1 << 18
 """Records of a chunk beyond one for every four of its bytes: a bomb holds millions."""
 
-StampOf = Callable[[Channel, Schema | None, Message], int | None]
+StampOf = Callable[[Channel, Schema | None, records.Message], int | None]
 """Return the header stamp of a message; None if its fields contradict its length."""
 
 
@@ -84,15 +57,15 @@ class Gap(NamedTuple):
 class Scan:
     """The chunks, messages, descriptions and gaps of a file."""
 
-    def __init__(self, source: FileBytes, stamp_of: StampOf) -> None:
+    def __init__(self, source: records.FileBytes, stamp_of: StampOf) -> None:
         self.source, self.stamp_of = source, stamp_of
-        self.reader = ChunkReader(source)
-        self.summary = read_summary(source)
-        self.chunks: list[Chunk] = []
+        self.reader = records.ChunkReader(source)
+        self.summary = records.read_summary(source)
+        self.chunks: list[records.Chunk] = []
         """The chunks in the order of the file."""
-        self.indexes: list[dict[int, Entries] | None] = []
+        self.indexes: list[dict[int, records.Entries] | None] = []
         """Each chunk's messages by channel; None if its message indexes are damaged."""
-        self.seen: dict[int, Mapping[int, Entries]] = {}
+        self.seen: dict[int, Mapping[int, records.Entries]] = {}
         """The messages by channel of the chunks that were looked into."""
         self.loose: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         """Log times and offsets, in turn, of the messages outside chunks, by channel."""
@@ -118,7 +91,7 @@ class Scan:
         self._borders = [0, *sorted(self._listed), *[end] * bool(self._listed), inf]
         self._sizes = {(chunk.size, chunk.data_size) for chunk in self._listed.values()}
         self._records_left = RECORDS
-        self._tries_left = DOUBTED + 4 * len(source)
+        self._tries_left = records.DOUBTED + 4 * len(source)
         self._walk()
 
     def _walk(self) -> None:
@@ -172,24 +145,25 @@ class Scan:
         following = following or self._next(search_from, record)
         if in_doubt:
             record = self._remains(record.content, following.offset)
-        is_taken = is_complete or in_doubt or following.offset > record.end - PADDING
+        is_taken = is_complete or in_doubt or following.offset > record.end - records.PADDING
         if record.opcode == MESSAGE and is_taken:  # if its fields do not contradict its length
             channel = self.channels.get(record.content[0])
             schema = self.schemas.get(channel.schema_id) if channel else None
             is_taken = channel is not None and (
-                self.stamp_of(channel, schema, message_at(self.source, record.offset)) is not None
+                self.stamp_of(channel, schema, records.message_at(self.source, record.offset))
+                is not None
             )
         if is_taken:
             self._take(record)
         begin = record.end if is_taken else record.offset
         if following.offset > begin or not is_taken:
-            if self.indexes and record.opcode in (CHUNK, MESSAGE_INDEX):
+            if self.indexes and record.opcode in (CHUNK, records.MESSAGE_INDEX):
                 self.indexes[-1] = None
             if self.data_end is None or following.opcode in (CHUNK, MESSAGE):
                 self.gaps.append(Gap(begin, following.offset, reason))
         return following
 
-    def _remains(self, chunk: Chunk, end: int) -> Record:
+    def _remains(self, chunk: records.Chunk, end: int) -> Record:
         """Return what is left of a damaged chunk before the next record, at ``end``."""
         if chunk.cut and end == chunk.data_end:
             return chunk.record
@@ -209,7 +183,7 @@ class Scan:
             self.loose[channel_id].extend((log_time, record.offset))
         elif opcode == CHUNK:
             self._take_chunk(content)
-        elif opcode == MESSAGE_INDEX and self.chunks and self.indexes[-1] is not None:
+        elif opcode == records.MESSAGE_INDEX and self.chunks and self.indexes[-1] is not None:
             channel_id, entries = content
             chunk, index = self.chunks[-1], self.indexes[-1]
             if len(entries):
@@ -219,7 +193,7 @@ class Scan:
                     self.indexes[-1] = None  # it contradicts its chunk
                 else:
                     index[channel_id] = entries
-        elif opcode in DEFINITIONS:
+        elif opcode in records.DEFINITIONS:
             is_new = content.id not in self.described(content)
             if self.data_end is not None and (is_new or self.chunks):
                 self.late.append(content)
@@ -231,7 +205,7 @@ class Scan:
             self.data_end, self.after_data = record.offset, record.end
             self.data_crc = content.data_section_crc
 
-    def _take_chunk(self, chunk: Chunk) -> None:
+    def _take_chunk(self, chunk: records.Chunk) -> None:
         if chunk.repaired:
             reason = "the head of a chunk is damaged; what it said was found out otherwise"
             self.gaps.append(Gap(chunk.offset, chunk.data_offset, reason, False))
@@ -256,31 +230,31 @@ class Scan:
         if record not in (conflict for _, conflict in self.conflicts):
             self.conflicts.append((offset, record))
 
-    def look(self, number: int) -> Mapping[int, Entries]:
+    def look(self, number: int) -> Mapping[int, records.Entries]:
         """Walk through a chunk; learn its channels, and return the places of its messages."""
         chunk = self.chunks[number]
-        records = self.reader.read(chunk)
+        content = self.reader.read(chunk)
         messages: dict[int, array[int]] = defaultdict(partial(array, "Q"))
         end, problem = 0, ""
         # However well a chunk is compressed, a message takes four bytes: its times differ.
         usual = chunk.data_size // 4
         allowed = usual + self._records_left // 2
-        for count, (opcode, offset, body, after, _) in enumerate(walk(records)):
+        for count, (opcode, offset, body, after, _) in enumerate(records.walk(content)):
             if count == allowed:
                 problem = f"a chunk of so many records that only the first {allowed} were read"
                 self._records_left -= allowed - usual
                 break
             end = after
             if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
-                head = records[body : body + MESSAGE_HEAD.size]
+                head = content[body : body + MESSAGE_HEAD.size]
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
                 messages[channel_id].extend((log_time, offset))
-            elif opcode in DEFINITIONS:
+            elif opcode in records.DEFINITIONS:
                 with suppress(BadRecord):  # its messages will show that the description is missing
-                    self.define(parse(opcode, records[body:after]), chunk.offset)
-            elif opcode < PRIVATE:
+                    self.define(records.parse(opcode, content[body:after]), chunk.offset)
+            elif opcode < records.PRIVATE:
                 problem = "a chunk that holds more than messages, which is not read"
-        if end != len(records) and not chunk.cut:
+        if end != len(content) and not chunk.cut:
             problem = problem or "a chunk whose records do not add up"
         if problem:
             self.reader.flawed.setdefault(chunk.offset, problem)
@@ -322,8 +296,8 @@ class Scan:
             if inner > end:
                 raise BadRecord("an attachment whose lengths contradict each other")
             return None
-        if opcode == MESSAGE or opcode >= PRIVATE:
-            fits = MESSAGE_HEAD.size <= end - body <= LARGEST
+        if opcode == MESSAGE or opcode >= records.PRIVATE:
+            fits = MESSAGE_HEAD.size <= end - body <= records.LARGEST
             channel_id, _, log_time, _ = MESSAGE_HEAD.unpack_from(head.ljust(_HEADS), HEAD.size)
             if opcode != MESSAGE and fits and self._is_described(channel_id):
                 raise BadRecord("a message whose kind is damaged")
@@ -332,10 +306,14 @@ class Scan:
             if self._is_index_here(offset):
                 raise BadRecord("a message where a message index should be")
             return channel_id, log_time
-        if end - body > LARGEST:
+        if end - body > records.LARGEST:
             raise BadRecord("a record of a length that cannot be")
         data = self.source[body:end]
-        return parse_message_index(data) if opcode == MESSAGE_INDEX else parse(opcode, data)
+        return (
+            records.parse_message_index(data)
+            if opcode == records.MESSAGE_INDEX
+            else records.parse(opcode, data)
+        )
 
     def _around(self, offset: int) -> tuple[float, float]:
         """Return the beginnings of the chunk at or before a byte and of the next one."""
@@ -349,12 +327,12 @@ class Scan:
     def _is_described(self, channel_id: int) -> bool:
         return not self.channels or channel_id in self.channels
 
-    def _chunk(self, record: Record) -> Chunk:
+    def _chunk(self, record: Record) -> records.Chunk:
         """Read a chunk's head, which gives the length twice; the summary gives it a third time."""
-        heads, agrees, size = list[Chunk](), False, len(self.source)
+        heads, agrees, size = list[records.Chunk](), False, len(self.source)
         listed = self.summary.chunks.get(record.offset)
         with suppress(BadRecord):
-            head = parse_chunk(self.source, record)
+            head = records.parse_chunk(self.source, record)
             agrees = head.data_end == record.end and record.opcode == CHUNK
             if agrees and listed == head._replace(crc=0):
                 return head._replace(proven=True)
@@ -374,9 +352,9 @@ class Scan:
     def _hidden_chunk(self, offset: int) -> Record | None:
         """Find a chunk here by its checksum, although its kind or lengths are damaged."""
         with suppress(BadRecord):
-            chunk = parse_chunk(self.source, record_at(self.source, offset))
+            chunk = records.parse_chunk(self.source, records.record_at(self.source, offset))
             anything = Record(CHUNK, offset, offset, len(self.source))
-            if chunk.compression in COMPRESSIONS:
+            if chunk.compression in records.COMPRESSIONS:
                 for end in (chunk.data_end, self._next(chunk.data_offset, anything).offset):
                     left = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
                     if proven := self.reader.proof(left):
@@ -399,7 +377,7 @@ class Scan:
                 continue
             with suppress(BadRecord):
                 # A place counts as 256 bytes, and the bytes that a record there claims.
-                claimed = record_at(self.source, offset).end - offset
+                claimed = records.record_at(self.source, offset).end - offset
                 self._tries_left -= 256 + (claimed if claimed <= size - offset else 0)
                 if self._tries_left < 0:
                     break
@@ -410,11 +388,13 @@ class Scan:
 
     def _candidates(self, begin: int) -> Iterator[int]:
         """Yield the positions from ``begin`` on at which a record may begin."""
-        for at in range(begin, len(self.source), BLOCK):
-            block = self.source[at : at + BLOCK + HEAD.size]
+        for at in range(begin, len(self.source), records.BLOCK):
+            block = self.source[at : at + records.BLOCK + HEAD.size]
             offsets = {at + match.start() for match in _CANDIDATE.finditer(block)}
-            offsets |= {int(border) for border in self._borders if at <= border < at + BLOCK}
-            yield from sorted(offset for offset in offsets if offset < at + BLOCK)
+            offsets |= {
+                int(border) for border in self._borders if at <= border < at + records.BLOCK
+            }
+            yield from sorted(offset for offset in offsets if offset < at + records.BLOCK)
 
     def _is_believed(self, record: Record, doubted: Record) -> bool:
         """Return whether this looks like a record of the log by more than chance."""
@@ -422,11 +402,11 @@ class Scan:
         in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
         if opcode == CHUNK:
             is_listed = (content.size, content.data_size) in self._sizes
-            ours = is_listed if self._sizes else content.compression in COMPRESSIONS
+            ours = is_listed if self._sizes else content.compression in records.COMPRESSIONS
             return bool(content.proven or (ours and not in_chunk))
         if opcode in (END, BORDER, Opcode.HEADER) or (in_chunk and opcode not in _NOT_IN_CHUNKS):
             return False
-        if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
+        if opcode == records.MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
             return not self._listed or self._is_index_here(record.offset)
         if opcode == MESSAGE and not self._is_described(content[0]):
             return False
@@ -434,16 +414,16 @@ class Scan:
         return True
 
 
-def definitions(records: Bytes) -> list[Any]:
+def definitions(content: records.Bytes) -> list[Any]:
     """Return the schemas and channels of a chunk."""
     descriptions = []
-    for opcode, _, body, end, _ in islice(walk(records), RECORDS):
-        if opcode in DEFINITIONS:
+    for opcode, _, body, end, _ in islice(records.walk(content), RECORDS):
+        if opcode in records.DEFINITIONS:
             with suppress(BadRecord):
-                descriptions.append(parse(opcode, records[body:end]))
+                descriptions.append(records.parse(opcode, content[body:end]))
     return descriptions
 
 
-def entries_of(values: array[int]) -> Entries:
+def entries_of(values: array[int]) -> records.Entries:
     """Return the rows of a flat array of log times and offsets."""
     return np.frombuffer(values, np.int64).reshape(-1, 2)

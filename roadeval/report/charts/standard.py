@@ -260,8 +260,7 @@ def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference
         [thin(series("each frame", look, pairs["frame"], 100 * pairs["change"]))],
         unit="points",
         level=Level(
-            "mean" if mean.low is None else "mean and its interval",
-            *map(in_percent, ends_of(mean)),
+            "mean" if mean.low is None else "mean and its interval", *map(in_percent, ends_of(mean))
         ),
     )
 
