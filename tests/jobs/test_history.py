@@ -1,7 +1,6 @@
 """Histories of many results: read in their order, judged, and written."""
 
 import json
-import os
 import shutil
 from dataclasses import replace
 
@@ -39,6 +38,12 @@ def nights(tmp_path_factory):
     return folder
 
 
+def copy_sums(nights, folder):
+    """Copy the runs without what lies apart for each drive."""
+    apart = ("results", "frames", "regions", "worst", "scores", "classes")
+    return shutil.copytree(nights, folder, ignore=shutil.ignore_patterns(*apart))
+
+
 @pytest.fixture(scope="module")
 def made(nights):
     return history(nights)
@@ -66,7 +71,7 @@ def test_results_that_share_a_label_are_one_run(nights):
 
 
 def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path):
-    folder = shutil.copytree(nights, tmp_path / "nights")
+    folder = copy_sums(nights, tmp_path / "nights")
     old = folder / "2" / "fleet.json"
     old.write_text(old.read_text().replace('"version": 3', '"version": 2', 1))
     (folder / "3" / "scores.parquet").write_bytes(b"PAR1")
@@ -79,15 +84,11 @@ def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path)
 
 
 def test_two_logs_of_one_name_in_a_run_are_told(nights, tmp_path):
-    folder = shutil.copytree(nights, tmp_path / "nights")
-    fleet_of(tmp_path / "other", 6, seed=5, status=lambda _: SCORED)
-    origin = json.loads((folder / "7" / "fleet.json").read_text())["origin"]
-    shutil.copytree(tmp_path / "other", folder / "8")
-    table = read_parquet([folder / "8" / "drives.parquet"], "drives").assign(log_digest="another")
-    write_parquet({folder / "8" / "drives.parquet": ("drives", table)})
-    summary = folder / "8" / "fleet.json"
-    content = json.loads(summary.read_text()) | {"origin": origin}
-    summary.write_text(json.dumps(content))
+    folder = copy_sums(nights, tmp_path / "nights")
+    shutil.copytree(folder / "7", folder / "8")
+    path = folder / "8" / "drives.parquet"
+    table = read_parquet([path], "drives").assign(log_digest="another")
+    write_parquet({path: ("drives", table)})
     made = history(folder, by="build")
     assert len(made.lost) == 6
     assert "two logs of a run are called drive_0000-00000000" in made.lost[0]
@@ -105,11 +106,15 @@ def test_recordings_and_folders_of_one_run_are_not_taken_twice(nights, tmp_path)
 
 
 def test_a_drive_that_has_gone_and_classes_are_told(nights, tmp_path):
-    for night in range(7):
-        shutil.copytree(nights / f"{night}", tmp_path / f"{night}")
-    fleet_of(tmp_path / "7", 5, change=0.09, status=lambda _: SCORED)
-    os.utime(tmp_path / "7" / "fleet.json", (2 * 10**9,) * 2)
-    event = history(tmp_path).events[-1]
+    folder = copy_sums(nights, tmp_path / "nights")
+    for name in ("scores", "drives"):
+        path = folder / "7" / f"{name}.parquet"
+        rows = read_parquet([path], name)
+        rows = rows[rows["drive"] != "drive_0005-00000005"]
+        if name == "scores":
+            rows["ERR"] += 0.05
+        write_parquet({path: (name, rows)})
+    event = history(folder).events[-1]
     assert event.run == 7
     assert "drives that are gone: drive_0005-00000005" in event.reasons
 
@@ -131,7 +136,7 @@ def test_the_base_of_a_comparison_is_the_last_good_run_of_a_folder(made, nights)
 
 
 def test_a_last_run_without_numbers_neither_undoes_a_step_nor_is_good(nights, tmp_path):
-    folder = shutil.copytree(nights, tmp_path / "nights")
+    folder = copy_sums(nights, tmp_path / "nights")
     (folder / "7" / "scores.parquet").write_bytes(b"PAR1")
     made = history(folder, fail_if=["post.filtered.ERR > +1pp"])
     assert verdict(made).endswith("No later run has undone it.")
@@ -156,7 +161,7 @@ def test_two_runs_that_differ_are_not_called_equal(nights):
 
 
 def test_times_that_are_none_put_a_run_first_or_last(nights, tmp_path):
-    folder = shutil.copytree(nights, tmp_path / "nights")
+    folder = copy_sums(nights, tmp_path / "nights")
     for night, made_ns in (("2", -(10**30)), ("3", 10**30)):
         summary = folder / night / "fleet.json"
         content = json.loads(summary.read_text())
