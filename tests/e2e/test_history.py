@@ -54,6 +54,7 @@ def test_the_bad_commit_is_named_on_terminal_page_and_in_json(nights, tmp_path):
     assert b"badbadba" in markdown
 
 
+@pytest.mark.sweep
 def test_the_last_run_is_guarded_and_the_last_good_one_is_a_base(nights, tmp_path):
     folder = tmp_path / "nightly"
     for night in ("18", "19", "20", "21"):
