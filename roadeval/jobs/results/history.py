@@ -50,7 +50,7 @@ DRIVES: Final = 3
 NEAR: Final = 10
 """Runs on both sides of a step whose frames are compared, if there is one drive."""
 UNKNOWN: Final = "nothing that the results know of"
-BATCH: Final = 50
+BATCH: Final = 100
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *RATES),
@@ -250,7 +250,7 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     texts = classes["name"].astype(str)
     part = texts.where(texts != "", "class " + classes["class"].astype(str))
     of_classes = classes.assign(kind="class", part=part, ERR=wrong, N=classes["pixels"])
-    kind = np.where(scores["region"] == ALL, ALL, "region")
+    kind = (scores["region"] == ALL).map({True: ALL, False: "region"}).astype("category")
     of_masks = scores.assign(kind=kind, part=scores["region"], road=scores["TP"] + scores["FN"])
     about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
     about = about.merge(only(scores, region=ALL)[[*key, "truth"]].drop_duplicates(key), on=key)
