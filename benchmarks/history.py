@@ -152,9 +152,9 @@ def found(kind: str, size: float, drives: int, runs: int, histories: int) -> str
         rates = history(rng, runs, drives, run_noise=RUN_NOISES[number % 3])
         added, first = plant(kind, runs, size)
         steps = trace(rates + added, np.ones(drives)).steps
-        named = [step for step in steps if step.change > 0 and step.found >= first]
+        named = [step for step in steps if step.change > 0 and step.alarm >= first]
         if named:
-            late.append(named[0].found - first + 1)
+            late.append(named[0].alarm - first + 1)
             off.append(abs(named[0].run - first))
     if not late:
         return "0"

@@ -26,7 +26,8 @@ from roadeval.evaluation.tables import finals, values_of
 from roadeval.report.chart import FAINT, thin
 from roadeval.report.charts.standard import describe_points, over_windows, short_end
 from roadeval.report.images import ExampleFrame, encode_jpeg, pictures_of
-from roadeval.report.pdf.typeset import typeset_figure, write_file
+from roadeval.report.pdf.typeset import typeset_figure
+from roadeval.report.writing import write_file
 from roadeval.runtime.text import elide, visible
 from roadeval.runtime.threads import map_ordered
 

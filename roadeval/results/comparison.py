@@ -48,7 +48,7 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
     """
     lines = []
     for label, settings in comparison.changed_settings.items():
-        # What a user brought comes first.
+        # Code and networks that a user brought come first.
         names = sorted(settings, key=lambda name: not name.startswith(("code of ", "network ")))
         pairs = [(name, *map(setting, settings[name])) for name in names]
         named = [f"{name} {before} to {after}" for name, before, after in pairs]

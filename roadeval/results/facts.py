@@ -487,7 +487,7 @@ class FleetFacts(FactsFile):
     slices: dict[str, list[Slice]] = field(default_factory=dict)
     """As in `Facts`, over groups of drives."""
     origin: Origin | None = None
-    """That of the last run; None in older results."""
+    """The origin of the last run; None in older results."""
 
     FORMAT = FLEET_FORMAT
     AGAIN = AGAIN

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from roadeval.data.words import counted, defined, interval, percent, points
 from roadeval.evaluation.comparison.conditions import Judgement
-from roadeval.evaluation.comparison.history import Change, Line
+from roadeval.evaluation.comparison.history import Line, LineChange
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.results.comparison import condition_of
@@ -48,14 +48,14 @@ class Event:
     """The changes of one run, the most telling first."""
 
     run: int
-    changes: list[Change]
+    changes: list[LineChange]
     reasons: Sequence[str] = ()
-    """What differs from the run before."""
+    """Differences from the run before, as ``svm.c 1 to 2``."""
     frames: list[tuple[str, int, float]] = field(default_factory=list)
     """Drive, number and change of ERR of the frames that changed most."""
 
     @property
-    def first(self) -> Change:
+    def first(self) -> LineChange:
         """The change that stands for the others."""
         return self.changes[0]
 
@@ -84,22 +84,22 @@ class History:
         return ([run for run in before if run.drives] or before)[-1]
 
 
-def _stands(change: Change, focus: str) -> bool:
+def _stands(change: LineChange, focus: str) -> bool:
     line, step, rise = change.line, change.step, change.difference.mean
-    # Of steps, as single runs are noisy, and the last one may have no level.
+    # Steps tell it: single runs are noisy, and the last one may have no level.
     since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
     is_level = line.title == TESTED and line.variant == focus and step.kind != "outlier"
     return bool(is_level and rise > 0 and since > step.change / 2)
 
 
-def group_changes(changes: Sequence[Change], focus: str) -> list[Event]:
+def group_changes(changes: Sequence[LineChange], focus: str) -> list[Event]:
     """Return the changes of each run as one event, in which ERR of the focus comes first.
 
     A step of a noisy line may be found some runs early or late: near ones belong together.
     """
     events: list[Event] = []
 
-    def rank(change: Change) -> tuple[bool | float, ...]:
+    def rank(change: LineChange) -> tuple[bool | float, ...]:
         line = change.line
         is_other = line.variant != focus, line.kind != ALL, line.rate != TESTED
         return *is_other, -abs(change.difference.mean)
@@ -114,7 +114,7 @@ def group_changes(changes: Sequence[Change], focus: str) -> list[Event]:
     return sorted(events, key=lambda event: event.run)
 
 
-def describe_change(change: Change, when: str = "") -> str:
+def describe_change(change: LineChange, when: str = "") -> str:
     """Return how much a line changed, on which drives, and how sure that is of others."""
     difference, kind = change.difference, change.step.kind
     verb, count = ("rose", difference.worse) if difference.mean > 0 else ("fell", difference.better)

@@ -38,7 +38,7 @@ def no_frames(line, before, after):
 
 def lines_of(rows):
     tags = {"tag_light": "light"}
-    lines = find_lines(rows, tags, RUNS)
+    lines = find_lines(rows, tags, RUNS, 0.95)
     return {(line.kind, line.part, line.rate): line for line in lines}
 
 
@@ -121,7 +121,7 @@ def test_drives_of_a_group_count_as_one():
 
 
 def judged(rows, *texts, last=5):
-    lines, settings = find_lines(rows, {}, RUNS), EvaluationSettings()
+    lines, settings = find_lines(rows, {}, RUNS, 0.95), EvaluationSettings()
     conditions = [Condition.parse(text) for text in texts]
     return [*judge_last(lines, conditions, last, settings, no_frames)]
 

@@ -23,7 +23,7 @@ from roadeval.evaluation.regions import ALL, titles
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, Difference, holm, over_drives
-from roadeval.evaluation.stats.steps import Step, trace
+from roadeval.evaluation.stats.steps import ChangePoint, trace
 from roadeval.evaluation.tables import KEY, group_rows, only, values_of
 
 if TYPE_CHECKING:
@@ -56,87 +56,102 @@ class Line(NamedTuple):
     """``(2, T)`` ends of the interval of each run's mean change over its drives, around the level;
     empty but for `TESTED` of all pixels, and NaN with too few drives."""
     noise: float
-    steps: tuple[Step, ...]
+    steps: tuple[ChangePoint, ...]
     drive_rates: Floats
     """``(T, D)`` mean of each drive in each run."""
     drives: pd.DataFrame
     """The name and the group of each drive, and its camera."""
 
 
-class Change(NamedTuple):
+class LineChange(NamedTuple):
     """A step of a line, and the drives that carry it."""
 
     line: Line
-    step: Step
+    step: ChangePoint
     difference: Difference
     """Mean after it minus mean before it, over the drives that were there before and after."""
     drives: pd.DataFrame
     """These drives with the means ``before`` and ``after``, the greatest change first."""
 
 
-def find_lines(rows: pd.DataFrame, tags: Mapping[str, str], count: int) -> list[Line]:
+def find_lines(
+    rows: pd.DataFrame, tags: Mapping[str, str], count: int, confidence: float
+) -> list[Line]:
     """Return the lines of ``count`` runs, with their steps.
 
     ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
-    ``part`` of the pixels: its rates, the drive's ``group``, the columns `PIXELS`, and those of the
-    drives' ``tags``, whose names are given by column. All lines are one family, see
-    `roadeval.evaluation.stats.steps`.
+    ``part`` of the pixels: its rates as fractions, the drive's ``group``, the columns `PIXELS`, and
+    those of the drives' ``tags``, whose names are given by column. All lines are one family, see
+    `roadeval.evaluation.stats.steps`; ``confidence`` is that of the intervals around levels.
     """
+    rows = rows.assign(scored=group_rows(rows, [*KEY, *PIXELS]).ngroup())
     parts = [*group_rows(rows, ["variant", "kind", "part"])]
     masks = only(rows, kind=ALL)
     for column, tag in tags.items():
         by_value = group_rows(masks[masks[column].notna()], ["variant", column])
         parts += [((variant, tag, value), part) for (variant, value), part in by_value]
     searched = [
-        (address, rate, part)
-        for address, part in parts
-        for rate in (RATES if address[1] == ALL else RATES[:1])
+        (*map(str, name), part, RATES if ALL in name else RATES[:1]) for name, part in parts
     ]
-    names = titles(values_of(only(rows, kind="region"), "part"))
-    family = len(searched)
-    return [_line(*one, names=names, count=count, family=family) for one in searched]
+    family = sum(len(rates) for *_, rates in searched)
+    regions = titles(values_of(only(rows, kind="region"), "part"))
+    lines: list[Line] = []
+    for variant, kind, part, part_rows, rates in searched:
+        drives, weights, values = _matrices(part_rows, rates, count)
+        name = {ALL: "", "region": regions.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
+        for rate, drive_rates in zip(rates, values, strict=True):
+            title = ", ".join(filter(None, (rate, name)))
+            about = variant, str(part_rows["stage"].iloc[-1]), kind, part, rate, title
+            means, levels, noise, steps = _follow(drive_rates, weights, family)
+            ends = np.zeros((0, count))
+            if title == TESTED:
+                ends = _ends(drive_rates, drives, steps, levels, confidence)
+            levels = np.clip(levels, 0, 1)  # other drives may have had lower rates
+            lines.append(Line(*about, means, levels, ends, noise, steps, drive_rates, drives))
+    return lines
 
 
-def _line(
-    address: tuple[str, str, str],
-    rate: str,
-    rows: pd.DataFrame,
-    *,
-    names: Mapping[str, str],
-    count: int,
-    family: int,
-) -> Line:
-    variant, kind, part = map(str, address)
-    name = {ALL: "", "region": names.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
-    title = ", ".join(filter(None, (rate, name)))
-    drive = group_rows(rows, [*KEY, *PIXELS]).ngroup().to_numpy()
-    drives = rows[[*KEY, "group"]][~rows.duplicated([*KEY, *PIXELS])].astype("str")
-    values = np.full((count, len(drives)), np.nan)
-    values[rows["run"], drive] = rows[rate]
-    same = group_rows(drives.drop_duplicates(), ["group"]).size()
-    weights = 1 / drives["group"].map(same).to_numpy(float)
+def _matrices(
+    rows: pd.DataFrame, rates: Sequence[str], count: int
+) -> tuple[pd.DataFrame, Floats, Floats]:
+    """Return the ``D`` drives of some rows, their weights ``(D,)``, and their rates.
+
+    The rates are ``(R, T, D)``, NaN where a run lacks the drive. Drives of a group share a weight.
+    """
+    _, first, column = np.unique(rows["scored"], return_index=True, return_inverse=True)
+    drives = rows[[*KEY, "group"]].iloc[first].astype("str")
+    sizes = group_rows(drives.drop_duplicates(), ["group"]).size()
+    values = np.full((len(rates), count, len(drives)), np.nan)
+    values[:, rows["run"], column] = rows[[*rates]].to_numpy().T
+    return drives, 1 / drives["group"].map(sizes).to_numpy(float), values
+
+
+def _follow(
+    values: Floats, weights: Floats, family: int
+) -> tuple[Floats, Floats, float, tuple[ChangePoint, ...]]:
+    """Return the means ``(T,)`` of a rate ``(T, D)``, its levels ``(T,)``, its noise, its steps."""
     there = ~np.isnan(values)
-    rates = np.where(there, values, 0) @ weights
     with np.errstate(invalid="ignore"):
-        rates /= there @ weights
-    levels, noise, steps = np.full(count, np.nan), 0.0, []
+        means = np.where(there, values, 0) @ weights / (there @ weights)
+    levels, noise, steps = np.full(len(values), np.nan), 0.0, []
     for runs in _stretches(there):
         traced = trace(values[runs], weights, family)
-        levels[runs] = traced.levels - traced.levels[-1] + rates[runs[-1]]
+        levels[runs] = traced.levels - traced.levels[-1] + means[runs[-1]]
         noise = traced.noise
         for step in traced.steps:
-            before, run, after, found = (int(runs[place]) for place in step[1:5])
-            steps.append(Step(step.kind, before, run, after, found, step.change))
-    about = variant, str(rows["stage"].iloc[-1]), kind, part, rate, title
-    ends = np.zeros((0, count))
-    if rate == TESTED and kind == ALL:
-        ends = _ends(values, drives, steps, levels)
-    levels = np.clip(levels, 0, 1)  # other drives may have had lower rates
-    return Line(*about, rates, levels, ends, noise, tuple(steps), values, drives)
+            places = [int(runs[place]) for place in step[1:5]]
+            steps.append(ChangePoint._make([step.kind, *places, step.change]))
+    return means, levels, noise, tuple(steps)
 
 
-def _ends(values: Floats, drives: pd.DataFrame, steps: Sequence[Step], levels: Floats) -> Floats:
-    """Return the ends of Student's interval over groups of drives around each run's level.
+def _ends(
+    values: Floats,
+    drives: pd.DataFrame,
+    steps: Sequence[ChangePoint],
+    levels: Floats,
+    confidence: float,
+) -> Floats:
+    """Return the ends, ``(2, T)``, of Student's interval over groups around each run's level.
 
     It is that of the drives' changes from their own means since the last step.
     """
@@ -151,7 +166,7 @@ def _ends(values: Floats, drives: pd.DataFrame, steps: Sequence[Step], levels: F
         for run, of_groups in enumerate(means, begin):
             defined = of_groups[~np.isnan(of_groups)]
             if len(defined) >= LEAST_GROUPS:
-                interval = mean_distribution(defined, independent=True).interval(0.95)
+                interval = mean_distribution(defined, independent=True).interval(confidence)
                 ends[:, run] = levels[run] - defined.mean() + interval
     return ends
 
@@ -162,13 +177,13 @@ def _stretches(there: Flags) -> Iterator[Sums]:
     ``there`` is ``(T, D)``. Runs without any drive are left out.
     """
     runs: list[int] = []
-    known = np.zeros(there.shape[1], bool)
+    seen = np.zeros(there.shape[1], bool)
     for run in np.flatnonzero(there.any(axis=1)).tolist():
-        if runs and not (known & there[run]).any():
+        if runs and not (seen & there[run]).any():
             yield np.array(runs)
-            runs, known = [], np.zeros_like(known)
+            runs, seen = [], np.zeros_like(seen)
         runs.append(run)
-        known |= there[run]
+        seen |= there[run]
     if runs:
         yield np.array(runs)
 
@@ -177,7 +192,7 @@ Within = Callable[[Line, range, range], Difference]
 """Returns the difference of a line within its only drive, from some runs to others, over frames."""
 
 
-def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> list[Change]:
+def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> list[LineChange]:
     """Return the steps in the order of their runs; those of ERR of masks are corrected together."""
     changes = []
     for line in lines:
@@ -186,7 +201,7 @@ def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> li
             # The end of a drift, whose beginning is like the level before.
             first = last - (last - step.run) // 4 if step.kind == "drift" else step.run
             runs = range(step.before, step.run), range(first, last + 1)
-            changes.append(Change(line, step, *_difference(line, *runs, confidence, within)))
+            changes.append(LineChange(line, step, *_difference(line, *runs, confidence, within)))
     tested = [n for n, c in enumerate(changes) if (c.line.kind, c.line.rate) == (ALL, TESTED)]
     corrected = holm([changes[place].difference for place in tested])
     for place, difference in zip(tested, corrected, strict=True):

@@ -16,14 +16,14 @@ from roadeval.data.arrays import Floats
 LEAST_NOISE: Final = 1e-6  # of a rate: what is below is rounding
 
 
-class Step(NamedTuple):
+class ChangePoint(NamedTuple):
     """A change of the level. Positions are those of runs."""
 
     kind: str  # "step", "drift" or "outlier"
     before: int  # the first run of the old level
     run: int  # the first run of the new level or of a drift's rise; an outlier's run
     after: int  # the last run of the new level or of a drift's rise, inclusive
-    found: int  # the run at which it was found: a look at fewer runs does not name it
+    alarm: int  # the run by which it is noticed: a look at fewer runs does not name it
     change: float  # new level minus old level
 
 
@@ -32,7 +32,7 @@ class Trace(NamedTuple):
 
     levels: Floats  # (T,), relative; NaN for a run without a drive in common with earlier ones
     noise: float  # standard deviation of one run's noise
-    steps: tuple[Step, ...]
+    steps: tuple[ChangePoint, ...]
 
 
 def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
@@ -45,7 +45,7 @@ def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
     twice the log-likelihood of Student's t with 3 degrees. One run some 33 noises off gains that,
     about ``exp(-3 h / 8)`` times a look by chance; ``benchmarks.history`` counts all that is named.
     """
-    odds, steps = math.log(365 * family / 0.05), list[Step]()
+    odds, steps = math.log(365 * family / 0.05), list[ChangePoint]()
     levels, jumps = np.full((2, len(values)), math.nan)
     left = np.flatnonzero(~np.isnan(values).all(axis=1))
     seen, anchor = -1, 0.0
@@ -70,7 +70,7 @@ def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
             steps[-1] = steps[-1]._replace(kind="drift", after=int(runs[start]))
         else:
             kind = "outlier" if back else "drift" if drifts else "step"
-            steps.append(Step._make([kind, *runs[[0, place, start, end]].tolist(), change]))
+            steps.append(ChangePoint._make([kind, *runs[[0, place, start, end]].tolist(), change]))
         begin, stop = (0, end) if back else (start, end + 1)
         left = left[(left >= runs[begin]) & ~(back & (left == seen))]
         anchor, seen = float(level[begin:stop].mean()), int(runs[stop - 1])
@@ -109,11 +109,11 @@ def _levels(values: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 def _noises(jumps: Floats, odds: float) -> Floats:
     """Return a run's noise: the median jump before it, or of the last 20; wide after a few."""
-    past, known = jumps[~np.isnan(jumps)], np.append(0, np.cumsum(~np.isnan(jumps)))
+    past, count = jumps[~np.isnan(jumps)], np.append(0, np.cumsum(~np.isnan(jumps)))
     number = np.arange(1, len(past) + 1)
     parts = [(np.sort(past[:n]), np.sort(past[max(n - 20, 0) : n])) for n in number.tolist()]
     medians = [max(part[(len(part) - 1) // 2] for part in pair) / 0.6745 for pair in parts]
-    return np.append(math.inf if odds else 0.0, medians * np.exp(odds / number))[known]
+    return np.append(math.inf if odds else 0.0, medians * np.exp(odds / number))[count]
 
 
 def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[int, Floats]:

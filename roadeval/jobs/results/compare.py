@@ -22,7 +22,7 @@ from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.comment import badge
 from roadeval.report.comparison import comment, document, markdown
-from roadeval.report.pdf.typeset import write_document, write_file
+from roadeval.report.writing import write_document, write_file
 from roadeval.results.comparison import as_dict, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED

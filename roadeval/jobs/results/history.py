@@ -29,7 +29,7 @@ from roadeval.evaluation.tables import KEY, MASK, concatenate, finals, most_chan
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
-from roadeval.report.pdf.typeset import write_document
+from roadeval.report.writing import write_document
 from roadeval.results.facts import FLEET, SUMMARY, Facts, Origin, json_text, plain
 from roadeval.results.history import Event, History, RunFacts, as_dict, group_changes
 from roadeval.results.schema import TAG
@@ -119,7 +119,7 @@ def history(
     newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
     settings, focus = newest.evaluation, newest.focus or ""
     tags = {str(name): str(name)[len(TAG) :] for name in rows if str(name).startswith(TAG)}
-    lines = find_lines(rows, tags, len(runs))
+    lines = find_lines(rows, tags, len(runs), settings.confidence)
     read = lru_cache(4 * NEAR)(partial(_read_frames, runs))
     within = partial(_within_drive, read, settings)
     events = [
@@ -134,7 +134,7 @@ def history(
 
 def list_results(results: Paths) -> list[Path]:
     """Return the paths of results, and of those below folders."""
-    return [path for given in list_paths(results) for path in find_results(local_path(given))]
+    return [path for place in list_paths(results) for path in find_results(local_path(place))]
 
 
 def find_results(path: Path) -> list[Path]:
@@ -316,11 +316,11 @@ def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
     yield from (f"{k} {setting(a)} to {setting(b)}" for k, (a, b) in parts.items() if a != b)
     had, has = (~np.isnan(line.drive_rates[place]) for place in places)
     names = line.drives["drive"].to_numpy()
-    came, gone, kept = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
+    came, gone, same = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
     for title, which in (
         ("new drives", came - gone),
         ("drives that are gone", gone - came),
-        ("drives with other frames or another truth", (came & gone) - kept),
+        ("drives with other frames or another truth", (came & gone) - same),
     ):
         if which:
             yield f"{title}: {first_of(sorted(which), DRIVES)}"

@@ -19,8 +19,9 @@ from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.blocks import Report
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings
-from roadeval.report.page.render import page, write_page
-from roadeval.report.pdf.typeset import typeset, write_file
+from roadeval.report.page.render import page
+from roadeval.report.pdf.typeset import typeset
+from roadeval.report.writing import write_file
 from roadeval.results.facts import FETCHED, Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.runtime.files import leads_outside, writing
@@ -68,7 +69,7 @@ def write_report(
     with holding(path, inputs=[source]):
         if path.suffix.lower() not in PAGES:
             return write_file(path, typeset(document(findings_of(opened))))
-        return write_page(path, page_of(opened, on_progress, path.parent))
+        return write_file(path, page(page_of(opened, on_progress, path.parent)))
 
 
 WIDTHS: Final = (4, 100)

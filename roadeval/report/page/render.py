@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.resources import files
-from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from roadeval.data.words import MINUS
@@ -23,9 +22,7 @@ from roadeval.report.blocks import Block, Cell, Heading, ImageFile, KeepTogether
 from roadeval.report.captions import caption
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import place_chart, range_of_frames, values
-from roadeval.report.pdf.typeset import ReportError
 from roadeval.report.sections.frames import FrameBrowser
-from roadeval.runtime.files import put, writing
 from roadeval.runtime.text import visible
 
 _SCRIPTS: Final = (
@@ -194,10 +191,3 @@ def _name(text: str, taken: set[str]) -> str:
         name = f"{plain}-{count}"
     taken.add(name)
     return name
-
-
-def write_page(path: Path, document: Report) -> Path:
-    """Write a document as a page; a `ReportError` if it cannot be written."""
-    with writing(path, partial(ReportError, remedy="choose another place")):
-        put(path, page(document))
-    return path

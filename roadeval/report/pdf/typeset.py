@@ -12,8 +12,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,7 +21,6 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from roadeval.data import colours
 from roadeval.errors import RoadevalError
-from roadeval.runtime.files import put, writing
 
 if TYPE_CHECKING:
     from roadeval.report.blocks import Report
@@ -100,41 +98,3 @@ def _compile(
             "another folder with TMPDIR"
         ) from error
     return compiled
-
-
-def write_file(path: Path, content: bytes) -> Path:
-    """Write a report; an incomplete file never has its name.
-
-    A `ReportError` if it cannot be written.
-    """
-    with writing(path, partial(ReportError, remedy="choose another place")):
-        put(path, content)
-    return path
-
-
-def write_document(
-    path: Path,
-    title: str,
-    document: Callable[[], Report],
-    markdown: Callable[[], str],
-    facts: Callable[[], str],
-) -> Path:
-    """Write a document as PDF, page, Markdown or JSON, by the file's ending.
-
-    A `RoadevalError`, with the document's ``title``, if the ending is another, or the file cannot
-    be written.
-    """
-    match path.suffix.lower():
-        case ".pdf":
-            content = typeset(document())
-        case ".html":
-            from roadeval.report.page.render import page
-
-            content = page(document())
-        case ".md":
-            content = markdown().encode()
-        case ".json":
-            content = facts().encode()
-        case _:
-            raise RoadevalError(f"{path}: {title} is written as .pdf, .html, .md, .json")
-    return write_file(path, content)

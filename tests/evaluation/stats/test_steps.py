@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks.history import FLEETS, NOISES, POINT, Fleet, complete, history, plant
 from roadeval.data.arrays import Floats
-from roadeval.evaluation.stats.steps import Step, trace
+from roadeval.evaluation.stats.steps import ChangePoint, trace
 
 
-def look(values: Floats, family: int = 1) -> tuple[Step, ...]:
+def look(values: Floats, family: int = 1) -> tuple[ChangePoint, ...]:
     """Return the steps of a history whose drives count alike."""
     return trace(values, np.ones(values.shape[1]), family).steps
 
@@ -33,13 +33,13 @@ def test_an_exact_history_names_a_change_in_its_first_run(before: int, family: i
 def test_a_change_of_some_drives_in_an_exact_history_is_named_in_its_first_run() -> None:
     values = exact(*[0.0] * 120, drives=20)
     values[100:, 3] += 2 * POINT
-    assert [(step.run, step.found) for step in look(values)] == [(100, 100)]
+    assert [(step.run, step.alarm) for step in look(values)] == [(100, 100)]
 
 
 def test_a_tool_that_ceases_to_be_exact_soon_names_no_more() -> None:
     steps = look(exact(*[0.0] * 60, *np.random.default_rng(1).normal(size=50)))
-    assert steps[0].found == 60
-    assert steps[-1].found < 75
+    assert steps[0].alarm == 60
+    assert steps[-1].alarm < 75
 
 
 def test_a_step_of_one_run_becomes_an_outlier_and_the_old_level_goes_on() -> None:
@@ -80,7 +80,7 @@ def test_drives_that_come_and_go_make_no_step_in_an_exact_history(fleet: Fleet) 
     values = history(rng, 200, 20, fleet=fleet, run_noise=0, spread=(1e-9, 2e-9))
     assert not look(values)
     values[150:] += 0.05 * POINT
-    assert [(step.run, step.found) for step in look(values)] == [(150, 150)]
+    assert [(step.run, step.alarm) for step in look(values)] == [(150, 150)]
 
 
 def test_levels_of_a_full_matrix_are_those_of_the_weighted_mean() -> None:
@@ -101,8 +101,8 @@ def test_a_look_names_what_the_longer_history_says_for_that_night() -> None:
     assert [step.kind for step in steps] == ["step", "outlier", "step"]
     assert [step.run for step in steps] == [20, 35, 45]
     for runs in range(18, 61):
-        found = [(step.before, step.run, step.found) for step in steps if step.found < runs]
-        assert [(step.before, step.run, step.found) for step in look(values[:runs])] == found
+        found = [(step.before, step.run, step.alarm) for step in steps if step.alarm < runs]
+        assert [(step.before, step.run, step.alarm) for step in look(values[:runs])] == found
 
 
 def test_the_order_of_drives_does_not_matter() -> None:
@@ -118,7 +118,7 @@ def test_more_series_need_more_evidence() -> None:
     values[60:] += 1.5 * POINT
     (alone,), (one_of_many,) = look(values), look(values, 1000)
     assert alone.run == one_of_many.run == 60
-    assert alone.found < one_of_many.found
+    assert alone.alarm < one_of_many.alarm
 
 
 def test_runs_without_drives_in_common_have_no_level() -> None:
