@@ -37,16 +37,19 @@ def group_rows(table: pd.DataFrame, by: Sequence[str]) -> Any:
 def concatenate(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     """Concatenate tables; a column is a categorical if it is one in any of them."""
     import pandas as pd
-    from pandas.api.types import union_categoricals
 
-    parts = [*tables]
-    filled = [part for part in parts if len(part)]
-    table = pd.concat(filled or parts[:1], ignore_index=True)
-    words = {n: None for part in parts for n in part.columns[part.dtypes == "category"]}
-    for name in words if filled else ():
-        columns = [part[name].astype("str").astype("category") for part in filled]
-        table[name] = union_categoricals(columns)
-    return table
+    given = [*tables]
+    parts = [part for part in given if len(part)] or given[:1]
+    words = {n: None for part in given for n in part.columns[part.dtypes == "category"]}
+    for name in words if len(parts) > 1 else ():
+        columns = [part[name].astype("category") for part in parts]
+        # A column without any word has no categories of text.
+        columns = [c.cat.rename_categories([*map(str, c.cat.categories)]) for c in columns]
+        texts = [text for column in columns for text in column.drop_duplicates().dropna()]
+        for place, column in enumerate(columns):
+            codes = column.cat.set_categories([*dict.fromkeys(texts)])
+            parts[place] = parts[place].assign(**{name: codes})
+    return pd.concat(parts, ignore_index=True)
 
 
 def only(table: pd.DataFrame, **values: Any) -> pd.DataFrame:

@@ -201,18 +201,20 @@ def read_parquet(
     name: str,
     columns: Collection[str] | None = None,
     runs: Sequence[int] | None = None,
+    flag: str = "",
 ) -> pd.DataFrame:
     """Read a table of a fleet's folder from its files, one below the other.
 
     With ``columns`` only these, and tags, are read and checked; ``drive`` must be one of them.
-    ``runs`` has a number for each file, which a column ``run`` then says of its rows. A
-    `ResultsError` if a file is missing or damaged, or has not the columns that it must have.
+    ``runs`` has a number for each file, which a column ``run`` then says of its rows. With ``flag``
+    only rows are returned in which this column is set. A `ResultsError` if a file is missing or
+    damaged, or has not the columns that it must have.
     """
     import pandas as pd
     import pyarrow as pa
 
     try:
-        table = _read_files(paths, TABLES[name], columns, runs)
+        table = _read_files(paths, TABLES[name], columns, runs, flag)
     except FileNotFoundError as error:
         raise ResultsError(f"{error.filename}: is not there; {AGAIN}") from None
     except (OSError, ValueError, pa.ArrowException) as error:
@@ -220,7 +222,9 @@ def read_parquet(
             read_parquet([path], name, columns)  # the damaged one is named
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
-    rows: pd.DataFrame = table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
+    has_gaps = any(c.null_count for c in table.columns if c.type == pa.int64())
+    types = {pa.int64(): pd.Int64Dtype()} if has_gaps else {}
+    rows: pd.DataFrame = table.to_pandas(types_mapper=types.get)
     counts = [n for n in rows if rows[n].dtype == "Int64" and not rows[n].hasnans]
     return rows.astype(dict.fromkeys(counts, np.int64)) if counts else rows
 
@@ -230,6 +234,7 @@ def _read_files(
     table: TableSchema,
     chosen: Collection[str] | None,
     runs: Sequence[int] | None,
+    flag: str,
 ) -> pa.Table:
     """Read files of a table and check them; a ValueError tells what is wrong with them."""
     import pyarrow as pa
@@ -250,10 +255,10 @@ def _read_files(
         ) as file:
             tags = [n for n in file.schema_arrow.names if of_drives and n.startswith(TAG)]
             part = file.read([*names, *tags] if chosen else None, use_threads=False)
-            parts.append(_check_columns(part, columns, complete))
-            if runs:
-                run = np.full(len(part), runs[place])
-                parts[-1] = parts[-1].append_column("run", pa.array(run))
+        part = _check_columns(part, columns, complete)
+        if runs:
+            part = part.append_column("run", pa.array(np.full(len(part), runs[place])))
+        parts.append(part.filter(part[flag]) if flag else part)
     rows = pa.concat_tables(parts or [table.arrow().empty_table()], promote_options="default")
     rows = rows.unify_dictionaries()
     for cells in (rows[word] for word in words if pa.types.is_dictionary(rows[word].type)):

@@ -10,6 +10,7 @@ import json
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -142,17 +143,14 @@ def _check(document: Any, most: int, *, shown: bool = True) -> None:
             raise ValueError(_TOO_DEEP)
         if values > most:
             raise ValueError(_TOO_MANY.format(most))
-        outer, level = level, []
-        for value in outer:
-            if isinstance(value, str):
-                texts.append(value)
-            elif isinstance(value, dict):
-                texts += value
-                level += value.values()
-            elif isinstance(value, list):
-                level += value
-                if shown and sum(len(text) for text in value if isinstance(text, str)) > LISTED:
-                    raise ValueError(f"a list in it has more than {LISTED:,} letters")
+        texts += [value for value in level if isinstance(value, str)]
+        tables = [value for value in level if isinstance(value, dict)]
+        lists = [value for value in level if isinstance(value, list)]
+        for values_of_list in lists if shown else ():
+            if sum(len(value) for value in values_of_list if isinstance(value, str)) > LISTED:
+                raise ValueError(f"a list in it has more than {LISTED:,} letters")
+        texts += chain(*tables)
+        level = [*chain(*(table.values() for table in tables), *lists)]
     if shown:
         check_texts(texts)
 

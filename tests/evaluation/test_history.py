@@ -7,7 +7,12 @@ import pandas as pd
 import pytest
 
 from roadeval.evaluation.comparison.conditions import Condition
-from roadeval.evaluation.comparison.history import find_changes, find_lines, judge_last
+from roadeval.evaluation.comparison.history import (
+    find_changes,
+    find_lines,
+    judge_last,
+    number_pixels,
+)
 from roadeval.evaluation.settings import EvaluationSettings
 
 DRIVES = [*"abcdefgh"]
@@ -29,7 +34,8 @@ def rows_of(change=lambda run, drive: 0.0, runs=RUNS, **columns):
             row |= dict.fromkeys(("ERR", "FPR", "FNR"), 0.02 + 0.01 * place + added)
             row |= {name: value(run, drive) for name, value in columns.items()}
             rows += [] if math.isnan(added) else [row]
-    return pd.DataFrame(rows).replace("", None)
+    made = pd.DataFrame(rows).replace("", None)
+    return made.assign(pixels=number_pixels(made))
 
 
 def no_frames(line, before, after):
@@ -147,6 +153,7 @@ def test_a_condition_on_what_is_not_there_is_not_judged():
     gone = rows_of(lambda run, drive: 0.0)
     gone = gone[(gone["run"] < 11) | (gone["drive"] == "a")]
     gone.loc[gone["run"] == 11, "truth"] = 2
+    gone = gone.assign(pixels=number_pixels(gone))
     (unknown,) = judged(gone, "post.yours.ERR > +1pp")
     assert unknown.holds is None
     assert "post.mine.ERR" in unknown.why

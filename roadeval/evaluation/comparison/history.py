@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PIXELS: Final = ("log_digest", "truth", "frames", "road", "N")
-"""Columns that tell whether two runs scored the same pixels of a drive."""
+"""Columns that tell whether two runs scored the same pixels of a drive, see `number_pixels`."""
 RATES: Final = (TESTED, "FPR", "FNR")
 """The rates of a whole mask that are searched; of a part of its pixels only the first is."""
 
@@ -74,29 +74,41 @@ class LineChange(NamedTuple):
     """These drives with the means ``before`` and ``after``, the greatest change first."""
 
 
+def number_pixels(rows: pd.DataFrame) -> pd.Series[int]:
+    """Return a number for each row: rows of the same pixels of a drive have the same, see `PIXELS`.
+
+    It depends on the row alone. Two others are equal by chance once in 2^64 pairs.
+    """
+    from pandas.util import hash_pandas_object
+
+    return hash_pandas_object(rows[[*KEY, *PIXELS]], index=False)
+
+
 def find_lines(
     rows: pd.DataFrame, tags: Mapping[str, str], count: int, confidence: float
 ) -> list[Line]:
     """Return the lines of ``count`` runs, with their steps.
 
     ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
-    ``part`` of the pixels: its rates as fractions, the drive's ``group``, the columns `PIXELS`, and
-    those of the drives' ``tags``, whose names are given by column. All lines are one family, see
-    `roadeval.evaluation.stats.steps`; ``confidence`` is that of the intervals around levels.
+    ``part`` of the pixels: its rates as fractions, the drive's ``group``, ``pixels`` as
+    `number_pixels` has them, and the columns of the drives' ``tags``, whose names are given. All
+    lines are one family, see `roadeval.evaluation.stats.steps`; ``confidence`` is that of the
+    intervals around levels.
     """
-    rows = rows.assign(scored=group_rows(rows, [*KEY, *PIXELS]).ngroup())
-    parts = [*group_rows(rows, ["variant", "kind", "part"])]
-    masks = only(rows, kind=ALL)
+    places = {**group_rows(rows, ["variant", "kind", "part"]).indices}
+    is_mask = (rows["kind"] == ALL).to_numpy()
     for column, tag in tags.items():
-        by_value = group_rows(masks[masks[column].notna()], ["variant", column])
-        parts += [((variant, tag, value), part) for (variant, value), part in by_value]
+        tagged = np.flatnonzero(is_mask & rows[column].notna().to_numpy())
+        by_value = group_rows(rows.iloc[tagged], ["variant", column]).indices
+        places |= {(variant, tag, value): tagged[n] for (variant, value), n in by_value.items()}
     searched = [
-        (*map(str, name), part, RATES if ALL in name else RATES[:1]) for name, part in parts
+        (*map(str, key), n, RATES if ALL in key else RATES[:1]) for key, n in places.items()
     ]
     family = sum(len(rates) for *_, rates in searched)
     regions = titles(values_of(only(rows, kind="region"), "part"))
     lines: list[Line] = []
-    for variant, kind, part, part_rows, rates in searched:
+    for variant, kind, part, numbers, rates in searched:
+        part_rows = rows[[*KEY, "run", "pixels", "group", "stage", *rates]].iloc[numbers]
         drives, weights, values = _matrices(part_rows, rates, count)
         name = {ALL: "", "region": regions.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
         for rate, drive_rates in zip(rates, values, strict=True):
@@ -118,8 +130,8 @@ def _matrices(
 
     The rates are ``(R, T, D)``, NaN where a run lacks the drive. Drives of a group share a weight.
     """
-    _, first, column = np.unique(rows["scored"], return_index=True, return_inverse=True)
-    drives = rows[[*KEY, "group"]].iloc[first].astype("str")
+    column, first = rows["pixels"].factorize()[0], ~rows["pixels"].duplicated()
+    drives = rows.loc[first, [*KEY, "group"]].astype("str")
     sizes = group_rows(drives.drop_duplicates(), ["group"]).size()
     values = np.full((len(rates), count, len(drives)), np.nan)
     values[:, rows["run"], column] = rows[[*rates]].to_numpy().T

@@ -19,13 +19,28 @@ from roadeval.data.words import first_of, setting
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison.compare import changed_settings
 from roadeval.evaluation.comparison.conditions import Condition
-from roadeval.evaluation.comparison.history import RATES, Line, find_changes, find_lines, judge_last
+from roadeval.evaluation.comparison.history import (
+    RATES,
+    Line,
+    find_changes,
+    find_lines,
+    judge_last,
+    number_pixels,
+)
 from roadeval.evaluation.comparison.pairing import common_masks
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import Difference, within_drive
-from roadeval.evaluation.tables import KEY, MASK, concatenate, finals, most_changed_frames, only
+from roadeval.evaluation.tables import (
+    KEY,
+    MASK,
+    concatenate,
+    finals,
+    group_rows,
+    most_changed_frames,
+    only,
+)
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.result import Result, local_path
 from roadeval.report.history import document, markdown
@@ -50,7 +65,7 @@ DRIVES: Final = 3
 NEAR: Final = 10
 """Runs on both sides of a step whose frames are compared, if there is one drive."""
 UNKNOWN: Final = "nothing that the results know of"
-BATCH: Final = 100
+BATCH: Final = 30
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *RATES),
@@ -90,30 +105,37 @@ def history(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     lost: list[str] = []
-    opened: dict[Path, Result] = {}
+    origins: dict[Path, Origin] = {}
+    drives: dict[Path, Result] = {}  # the facts of hundreds of fleets would fill the memory
     for path in list_results(results):
         try:
-            opened[path] = Result(path)
-            if not opened[path].complete:
+            result = Result(path)
+            if not result.complete:
                 raise RoadevalError("a partial recording, which is left out", where=path)
         except RoadevalError as error:
-            opened.pop(path, None)
             lost.append(error.sentence)
-    runs = _runs_in_order(opened, by, lost)
+            continue
+        origins[path] = _origin(result, path)
+        if result.fleet is None:
+            drives[path] = result
+    runs = _runs_in_order(origins, by, lost)
     if len(runs) < 2:
         remedy = lost[0] if lost else ""
         problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
         raise RoadevalError(problem, remedy=remedy)
     run_of = np.array([n for n, run in enumerate(runs) for _ in run.paths])
-    numbered = [*enumerate(opened[Path(path)] for run in runs for path in run.paths)]
-    rows = _read_rows(numbered, lost, on_progress)
+    paths = [Path(path) for run in runs for path in run.paths]
+    rows = _read_rows(paths, drives, lost, on_progress)
     rows = rows.assign(run=run_of[rows["run"]])
     key = ["run", *KEY]
-    logs = rows[[*key, "log_digest"]].drop_duplicates()
-    names = logs[logs.duplicated(key)]["drive"].unique()
-    lost += [f"two logs of a run are called {name}: only the later result counts" for name in names]
-    rows = rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
-    masks = rows[~rows.duplicated(key)].groupby("run")["frames"].agg(["size", "sum"])
+    if by:
+        logs = rows[[*key, "log_digest"]].drop_duplicates()
+        names = logs[logs.duplicated(key)]["drive"].unique()
+        only_one = "two logs of a run are called {}: only the later result counts"
+        lost += map(only_one.format, names)
+        rows = rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
+    masks = only(rows, kind=ALL).drop_duplicates(key)
+    masks = masks.groupby("run")["frames"].agg(["size", "sum"])
     sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
     newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
@@ -168,12 +190,12 @@ def last_good(path: Path, besides: Sequence[Path]) -> Path:
 
 
 def _runs_in_order(
-    opened: Mapping[Path, Result], by: str | None, lost: list[str]
+    origins: Mapping[Path, Origin], by: str | None, lost: list[str]
 ) -> list[RunFacts]:
     """Return the runs by time; results without the label ``by`` are lost."""
     groups: dict[str, list[tuple[Origin, str]]] = {}
-    origins = [(_origin(result, path), str(path)) for path, result in opened.items()]
-    for origin, path in sorted(origins, key=lambda one: (one[0].made_ns, one[1])):
+    pairs = [(origin, str(path)) for path, origin in origins.items()]
+    for origin, path in sorted(pairs, key=lambda pair: (pair[0].made_ns, pair[1])):
         if by and by not in origin.labels:
             lost.append(f"{path}: has no label {by}")
         else:
@@ -199,67 +221,80 @@ def _origin(result: Result, path: Path) -> Origin:
 
 
 def _read_rows(
-    numbered: Sequence[tuple[int, Result]], lost: list[str], on_progress: OnProgress
+    paths: Sequence[Path],
+    drives: Mapping[Path, Result],
+    lost: list[str],
+    on_progress: OnProgress,
 ) -> pd.DataFrame:
-    """Return the rows of some results for `find_lines`, by the numbers of these."""
-    fleets = [one for one in numbered if one[1].fleet]
-    batches = [fleets[begin : begin + BATCH] for begin in range(0, len(fleets), BATCH)]
-    batches += [[one] for one in numbered if not one[1].fleet]
-    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in COLUMNS}
-    done = 0
-    for batch in batches:
-        on_progress(Progress(done, len(numbered), "reading", unit="results"))
-        done += len(batch)
-        for name, tables in parts.items():
-            tables.extend(table for table in _read_batch(batch, name, lost) if len(table))
-    if not parts["scores"]:
+    """Return the rows for `find_lines` of results, which are fleets but for the ``drives``."""
+    parts: list[pd.DataFrame] = []
+    for begin in range(0, len(paths), BATCH):
+        on_progress(Progress(begin, len(paths), "reading", unit="results"))
+        batch = [*enumerate(paths[begin : begin + BATCH], begin)]
+        groups = [[run for run in batch if run[1] not in drives]]
+        groups += [[run] for run in batch if run[1] in drives]
+        tables = {
+            name: [table for runs in groups for table in _read_batch(runs, drives, name, lost)]
+            for name in COLUMNS
+        }
+        if any(map(len, tables["scores"])):
+            tables["classes"].append(read_table("classes", "").assign(run=0))
+            parts.append(_join_tables(*map(concatenate, tables.values())))
+    if not parts:
         raise RoadevalError(lost[0] if lost else "nothing was scored in any of the runs")
-    parts["classes"] = parts["classes"] or [read_table("classes", "").assign(run=0)]
-    # To concatenate a single table takes as long as reading it.
-    return _join_tables(*(concatenate(t) if len(t) > 1 else t[0] for t in parts.values()))
+    return concatenate(parts)
 
 
 def _read_batch(
-    batch: Sequence[tuple[int, Result]], name: str, lost: list[str]
+    batch: Sequence[tuple[int, Path]], drives: Mapping[Path, Result], name: str, lost: list[str]
 ) -> Iterator[pd.DataFrame]:
     """Yield a table of one drive, or of some fleets: together unless one of them is damaged."""
-    if name == "classes":
-        batch = [one for one in batch if not one[1].fleet or one[1].fleet.has_classes]
-    runs, files = [run for run, _ in batch], [r.paths[0] / f"{name}.parquet" for _, r in batch]
+    if name == "classes":  # not every fleet has some
+        batch = [run for run in batch if run[1] in drives or (run[1] / "classes.parquet").is_file()]
+    numbers, paths = [number for number, _ in batch], [path for _, path in batch]
+    is_scores = name == "scores"
     try:
-        if batch and batch[0][1].fleet is None:
-            rows = batch[0][1].table(name).assign(run=runs[0])
+        if paths and paths[0] in drives:
+            rows = drives[paths[0]].table(name).assign(run=numbers[0])
         else:
-            rows = read_parquet(files, name, COLUMNS[name], runs)
-        is_scores = name == "scores"
+            files, flag = [path / f"{name}.parquet" for path in paths], "final" * is_scores
+            rows = read_parquet(files, name, COLUMNS[name], numbers, flag)
         yield rows[rows["final"] & (rows["variant"] != BASELINE)] if is_scores else rows
     except RoadevalError as error:
         if len(batch) == 1:
             lost.append(error.sentence)
         else:
-            yield from chain(*(_read_batch([one], name, lost) for one in batch))
+            yield from chain(*(_read_batch([run], drives, name, lost) for run in batch))
 
 
 def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFrame) -> pd.DataFrame:
     """Return the rows for `find_lines` from tables of all results, whose number is ``run``."""
+    import pandas as pd
+
     key = ["run", *KEY]
     is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
     classes = classes[is_class & (classes["pixels"] > 0)]
     right = classes["road"] / classes["pixels"]
     wrong = right.where(classes["truth"] == "other", 1 - right)
-    texts = classes["name"].astype(str)
-    part = texts.where(texts != "", "class " + classes["class"].astype(str))
-    of_classes = classes.assign(kind="class", part=part, ERR=wrong, N=classes["pixels"])
-    kind = (scores["region"] == ALL).map({True: ALL, False: "region"}).astype("category")
-    of_masks = scores.assign(kind=kind, part=scores["region"], road=scores["TP"] + scores["FN"])
+    numbers = group_rows(classes, ["class", "name"]).ngroup()
+    pairs = classes[["class", "name"]].drop_duplicates().astype("str").to_numpy()
+    names = pd.Categorical([name or f"class {number}" for number, name in pairs]).take(numbers)
+    kinds = pd.Categorical([ALL, "region", "class"])
+    of_classes = classes.assign(part=names, ERR=wrong, N=classes["pixels"])
+    of_classes["kind"] = kinds[np.full(len(classes), 2)]
+    of_masks = scores.assign(part=scores["region"], road=scores["TP"] + scores["FN"])
+    of_masks["kind"] = kinds[(scores["region"] != ALL).to_numpy(int)]
     about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
     about = about.merge(only(scores, region=ALL)[[*key, "truth"]].drop_duplicates(key), on=key)
     for other in ("log_digest", "drive"):
         about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
-    names = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *RATES]
-    parts = [part.reindex(columns=names) for part in (of_masks, of_classes) if len(part)]
+    about["group"] = about["group"].astype("category")
+    columns = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *RATES]
+    parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
-    return rows.merge(about, on=key)
+    # Of other categories a merge would make texts.
+    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=key)
+    return rows.assign(pixels=number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
 
 def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> pd.DataFrame:
