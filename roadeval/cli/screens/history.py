@@ -22,10 +22,8 @@ if TYPE_CHECKING:
 def show(history: History, out: Console) -> None:
     """Print the rates over the runs, the steps, and the verdict last."""
     runs = history.runs
-    drives = counted(runs[-1].drives, "drive")
-    out.print(
-        f"{counted(len(runs), 'run')}, {runs[0].title} to {runs[-1].title}, {drives} in the last"
-    )
+    about = f"{runs[0].title} to {runs[-1].title}, {counted(runs[-1].drives, 'drive')} in the last"
+    out.print(f"{counted(len(runs), 'run')}, {about}")
     out.print()
     rates = rates_table([line for line in history.lines if line.kind == ALL])
     if not out.encoding.startswith("utf"):  # no bars

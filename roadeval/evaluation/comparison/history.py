@@ -96,9 +96,8 @@ def find_lines(
     intervals around levels.
     """
     places = {**group_rows(rows, ["variant", "kind", "part"]).indices}
-    is_mask = (rows["kind"] == ALL).to_numpy()
     for column, tag in tags.items():
-        tagged = np.flatnonzero(is_mask & rows[column].notna().to_numpy())
+        tagged = np.flatnonzero((rows["kind"] == ALL) & rows[column].notna())
         by_value = group_rows(rows.iloc[tagged], ["variant", column]).indices
         places |= {(variant, tag, value): tagged[n] for (variant, value), n in by_value.items()}
     searched = [

@@ -17,16 +17,9 @@ import numpy as np
 from roadeval.data import BASELINE
 from roadeval.data.words import first_of, setting
 from roadeval.errors import RoadevalError
+from roadeval.evaluation.comparison import history as search
 from roadeval.evaluation.comparison.compare import changed_settings
 from roadeval.evaluation.comparison.conditions import Condition
-from roadeval.evaluation.comparison.history import (
-    RATES,
-    Line,
-    find_changes,
-    find_lines,
-    judge_last,
-    number_pixels,
-)
 from roadeval.evaluation.comparison.pairing import common_masks
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
@@ -68,7 +61,7 @@ UNKNOWN: Final = "nothing that the results know of"
 BATCH: Final = 30
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
-    "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *RATES),
+    "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *search.RATES),
     "drives": (*KEY, "name", "log_digest", "group", "status"),
     "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
 }
@@ -131,26 +124,24 @@ def history(
     if by:
         logs = rows[[*key, "log_digest"]].drop_duplicates()
         names = logs[logs.duplicated(key)]["drive"].unique()
-        only_one = "two logs of a run are called {}: only the later result counts"
-        lost += map(only_one.format, names)
+        lost += [f"two logs of a run are called {n}: only the later result counts" for n in names]
         rows = rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
-    masks = only(rows, kind=ALL).drop_duplicates(key)
-    masks = masks.groupby("run")["frames"].agg(["size", "sum"])
+    masks = only(rows, kind=ALL).drop_duplicates(key).groupby("run")["frames"].agg(["size", "sum"])
     sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
     newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
     settings, focus = newest.evaluation, newest.focus or ""
     tags = {str(name): str(name)[len(TAG) :] for name in rows if str(name).startswith(TAG)}
-    lines = find_lines(rows, tags, len(runs), settings.confidence)
+    lines = search.find_lines(rows, tags, len(runs), settings.confidence)
     read = lru_cache(4 * NEAR)(partial(_read_frames, runs))
     within = partial(_within_drive, read, settings)
     events = [
         replace(event, reasons=[*_reasons(runs, event)] or [UNKNOWN])
-        for event in group_changes(find_changes(lines, settings.confidence, within), focus)
+        for event in group_changes(search.find_changes(lines, settings.confidence, within), focus)
     ]
     for event in events[-DETAILED:]:
         event.frames.extend(_changed_frames(read, event))
-    judged = judge_last(lines, conditions, last, settings, within)
+    judged = search.judge_last(lines, conditions, last, settings, within)
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
 
 
@@ -289,12 +280,12 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     for other in ("log_digest", "drive"):
         about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
     about["group"] = about["group"].astype("category")
-    columns = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *RATES]
+    columns = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
     # Of other categories a merge would make texts.
     rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=key)
-    return rows.assign(pixels=number_pixels(rows)).drop(columns=["truth", "road", "N"])
+    return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
 
 def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> pd.DataFrame:
@@ -307,7 +298,7 @@ def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> 
 
 
 def _within_drive(
-    read: ReadFrames, settings: EvaluationSettings, line: Line, before: range, after: range
+    read: ReadFrames, settings: EvaluationSettings, line: search.Line, before: range, after: range
 ) -> Difference:
     """Return the change of a line within its only drive, over frames, as `Within` does."""
     (drive,) = line.drives[KEY].drop_duplicates().itertuples(index=False, name=None)

@@ -24,19 +24,8 @@ from roadeval.fleet.drives import (
 )
 from roadeval.fleet.engine import ATTEMPTS, is_worker_death, start_workers
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.run.fleet_work import (
-    GO_ON,
-    Done,
-    DriveTask,
-    FoldModel,
-    FoldTask,
-    ending_the_run,
-    find_valid,
-    mark_failed,
-    replay_drive,
-    report_drive,
-    train_fold,
-)
+from roadeval.jobs.run import fleet_work
+from roadeval.jobs.run.fleet_work import Done, DriveTask
 from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member, Origin
 from roadeval.results.fleet import FleetWriter, made_path
@@ -179,11 +168,11 @@ class FleetRun:
         for task in tasks:
             # A worker waits for a run that claims it, or clears away what a killed one left.
             claimed = is_claimed(made_path(self.folder, task.entry.id))
-            made = None if task.entry.path is None or claimed else find_valid(task)
+            made = None if task.entry.path is None or claimed else fleet_work.find_valid(task)
             if made is None:
                 waiting.append(task)
             else:
-                self.done[made.drive] = report_drive(self.folder, made, repeated=True)
+                self.done[made.drive] = fleet_work.report_drive(self.folder, made, repeated=True)
         return waiting
 
     def _engine(self) -> Executor:
@@ -204,16 +193,17 @@ class FleetRun:
         training = []
         for fold in range(count):
             others = tuple((e, configs[e.id]) for e in drawn if folds[e.id] != fold)
-            training.append(FoldTask(self.folder, fold, others, settings, software(settings)))
+            about = fold, others, settings, software(settings)
+            training.append(fleet_work.FoldTask(self.folder, *about))
         self.show("training")
-        futures = [engine.submit(train_fold, task) for task in training]
+        futures = [engine.submit(fleet_work.train_fold, task) for task in training]
         made, tasks = [], []
         for fold, future in enumerate(futures):
             try:
                 made.append(future.result())
             except Exception as error:  # it fails the fold's drives alone
                 problem = self._reason(error, f"the model of fold {fold} was trained")
-                made.append(FoldModel(fold, "", problem))
+                made.append(fleet_work.FoldModel(fold, "", problem))
         for entry in self.entries:
             model = made[folds[entry.id]]
             path = str(training[model.fold].path)
@@ -232,7 +222,7 @@ class FleetRun:
             return
         engine = self._engine()
         self.show("replaying")
-        waiting = {engine.submit(replay_drive, task): task for task in tasks}
+        waiting = {engine.submit(fleet_work.replay_drive, task): task for task in tasks}
         try:
             for future in as_completed(list(waiting)):
                 task = waiting.pop(future)
@@ -253,7 +243,7 @@ class FleetRun:
             raise error
         if isinstance(error, CancelledError):
             problem = "the workers have gone, or their scheduler"
-            raise FleetError(problem, where=self.folder, remedy=GO_ON) from error
+            raise FleetError(problem, where=self.folder, remedy=fleet_work.GO_ON) from error
         if is_worker_death(error):
             return (
                 f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
@@ -262,7 +252,7 @@ class FleetRun:
         return " ".join(f"{type(error).__name__}: {error}".split())
 
     def _fail(self, task: DriveTask, reason: str) -> None:
-        made = mark_failed(task, reason)
-        with ending_the_run(self.folder):
+        made = fleet_work.mark_failed(task, reason)
+        with fleet_work.ending_the_run(self.folder):
             made.write(self.folder)
-        self.done[made.drive] = report_drive(self.folder, made)
+        self.done[made.drive] = fleet_work.report_drive(self.folder, made)

@@ -17,17 +17,8 @@ from roadeval.images.formats import Limits, Size
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError, LogError, LostMessageError
+from roadeval.logs.messages import pictures
 from roadeval.logs.messages.encoding import PICTURES, TopicKind
-from roadeval.logs.messages.pictures import (
-    CompressedPicture,
-    Decoder,
-    LoggedPicture,
-    RawPicture,
-    Video,
-    codec_of,
-    decoder_for,
-    kind_of,
-)
 from roadeval.logs.messages.pixels import lossy_format, raw_format, to_labels
 from roadeval.logs.settings import NS
 
@@ -100,7 +91,7 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
         name=reader.name,
         schema=schema.name if schema else "",
         encoding=channel.message_encoding,
-        kind=kind_of(channel, schema),
+        kind=pictures.kind_of(channel, schema),
         count=count,
         first_ns=first,
         last_ns=last,
@@ -136,12 +127,12 @@ def _describe_picture(reader: TopicReader, position: int) -> dict[str, Any]:
     """Return the fields of a `TopicInfo` that one of its messages shows."""
     picture = reader.picture(position)
     kind, size, channels, turned = TopicKind.VIDEO, None, 3, 1
-    if isinstance(picture, RawPicture):
+    if isinstance(picture, pictures.RawPicture):
         kind, name, size = TopicKind.IMAGE, picture.encoding, (picture.width, picture.height)
         channels = 1 if raw_format(picture, reader.limits).is_grey else 3
-    elif name := codec_of(picture) or "":
+    elif name := pictures.codec_of(picture) or "":
         with suppress(FrameError, LogError):  # the first frame may not be decodable
-            first = Video(reader, reader.limits).picture(0)
+            first = pictures.Video(reader, reader.limits).picture(0)
             size, turned = first.pixels.shape[1::-1], first.turned
     else:
         pixels, turned = to_labels(picture, reader.limits), orientation_of(picture.data)
@@ -260,12 +251,12 @@ class TopicReader:
         for wrong, right in zip(sorted(listed.keys() - {*entries}), missed, strict=False):
             self.log_times[listed[wrong]], self._places[listed[wrong], 0] = right
 
-    def picture(self, position: int) -> LoggedPicture:
+    def picture(self, position: int) -> pictures.LoggedPicture:
         """Read the picture of a message; a `FrameError` if it cannot be read or decoded."""
         message = self.message(position)
         try:
             picture = self._decoder(position).picture(message.data)
-            if isinstance(picture, CompressedPicture) and picture.number is None:
+            if isinstance(picture, pictures.CompressedPicture) and picture.number is None:
                 return replace(picture, number=message.sequence)
             return picture
         except BadMessage as error:
@@ -360,15 +351,15 @@ class TopicReader:
         elif kind in (TopicKind.CALIBRATION, TopicKind.CLASSES):
             yield from range(max(low - 1, 0), low)
         elif kind is TopicKind.VIDEO and low < high:
-            low = Video(self, self.limits).keyframe(low)
+            low = pictures.Video(self, self.limits).keyframe(low)
         latest = np.searchsorted(self.log_times, end + 10 * NS) if kind in PICTURES else high
         while high < latest and self.stamp(0) < self.stamp(high) <= stamp:
             high += 1
         yield from range(low, high)
 
-    def _decoder(self, position: int) -> Decoder:
+    def _decoder(self, position: int) -> pictures.Decoder:
         source = self.carrier(position)
-        return decoder_for(source.channel, source.schema)
+        return pictures.decoder_for(source.channel, source.schema)
 
     def _error(self, position: int, reason: str) -> FrameError:
         return FrameError(reason, where=f"{self.name} message {position}")

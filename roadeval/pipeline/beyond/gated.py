@@ -32,20 +32,12 @@ from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, Truth, colours, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
+from roadeval.pipeline import stage
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import Scene, enlarge, mean, reduce_to, stretch
-from roadeval.pipeline.stage import (
-    Output,
-    Stage,
-    TrainingSet,
-    View,
-    check_arrays,
-    check_range,
-    per_view,
-    stage_settings,
-)
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
 GRID: Final = (12, 16)
 """Rows and columns of the cells by which the place of road is learnt."""
@@ -104,7 +96,7 @@ GAIN: Final = _map("gain", "Greatest gain of a channel", (1.0, GREATEST_GAIN))
 COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
 
 
-@stage_settings
+@stage.stage_settings
 class GatedSettings:
     """Settings of the gated filter.
 
@@ -200,10 +192,10 @@ class ShadedRoad:
     """The log-odds are ``sum_k weights[k] max(planes[k] . x + bias[k], 0) + offset``."""
 
     def __post_init__(self) -> None:
-        check_arrays(self, np.float64, place=GRID)
-        check_range("place", self.place, 0, 1)
+        stage.check_arrays(self, np.float64, place=GRID)
+        stage.check_range("place", self.place, 0, 1)
         shapes = {"planes": ("K", FEATURES), "bias": ("K",), "weights": ("K",), "offset": ()}
-        check_arrays(self, np.float32, **shapes)
+        stage.check_arrays(self, np.float32, **shapes)
 
 
 def fit(sample: TrainingSet, _settings: GatedSettings) -> ShadedRoad:
@@ -333,7 +325,7 @@ def brighten(image: Rgb, gain: Values) -> Rgb:
     return bright
 
 
-@per_view
+@stage.per_view
 def bind(settings: GatedSettings, model: ShadedRoad, view: View) -> Output:
     """Filter the image of a view."""
     shape = view.image.shape

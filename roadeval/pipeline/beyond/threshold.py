@@ -8,21 +8,13 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import CERTAIN, Layer, Packed, Probability, best_code, histogram, mask_spec
-from roadeval.pipeline.stage import (
-    Output,
-    Stage,
-    StageError,
-    TrainingSet,
-    View,
-    check_range,
-    per_view,
-    stage_settings,
-)
+from roadeval.pipeline import stage
+from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
 
 THRESHOLD: Final = mask_spec("threshold", "Road above the threshold of the training frames")
 
 
-@stage_settings
+@stage.stage_settings
 class ThresholdSettings:
     """The threshold has no settings: all labelled pixels of the training frames decide."""
 
@@ -35,7 +27,7 @@ class Threshold:
     """Pixels with a greater code of probability, 0..65535, are road."""
 
     def __post_init__(self) -> None:
-        check_range("code", self.code, 0, CERTAIN)
+        stage.check_range("code", self.code, 0, CERTAIN)
 
 
 def codes_of(opinion: Output | None) -> Probability:
@@ -52,7 +44,7 @@ def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
     return Threshold(best_code(np.sum(counts, axis=0)))
 
 
-@per_view
+@stage.per_view
 def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
     """Return the pixels where road is more probable than the threshold."""
     road = Packed.of(codes_of(view.opinion) > learnt.code)

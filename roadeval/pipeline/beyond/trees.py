@@ -28,6 +28,7 @@ from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, Rgb, mas
 from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values, sigmoid
 from roadeval.kernels import KERNELS
 from roadeval.kernels.plain import LEAVES
+from roadeval.pipeline import stage
 from roadeval.pipeline.beyond.features import (
     GROUPS,
     LIGHT,
@@ -43,19 +44,7 @@ from roadeval.pipeline.beyond.features import (
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
 from roadeval.pipeline.scene import Scene, reach, scene_of, stretch
-from roadeval.pipeline.stage import (
-    GREATEST,
-    MisfitError,
-    Output,
-    Stage,
-    StageError,
-    TrainingSet,
-    View,
-    check_arrays,
-    check_range,
-    perfect_mask,
-    stage_settings,
-)
+from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
 
 Sizes = npt.NDArray[np.int32]
 
@@ -94,11 +83,12 @@ class Forest:
     """Number of features that there were to choose from."""
 
     def __post_init__(self) -> None:
-        check_arrays(self, np.int32, feature=("T", NODES))
-        check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
-        check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
-        check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=(), inputs=())
-        check_range("feature", self.feature, 0, self.inputs - 1)
+        trees = len(self.feature)
+        stage.check_arrays(self, np.int32, feature=("T", NODES))
+        stage.check_arrays(self, np.uint32, kept=(trees, NODES))
+        stage.check_arrays(self, np.float32, threshold=(trees, NODES))
+        stage.check_arrays(self, np.float32, values=(trees, LEAVES), offset=(), inputs=())
+        stage.check_range("feature", self.feature, 0, self.inputs - 1)
         if not (self.kept >> np.uint32(LEAVES - 1)).all():
             raise ValueError("kept rules out a tree's last leaf, and so may leave none")
 
@@ -159,7 +149,7 @@ def tree_rows(
     nodes: npt.NDArray[Any], edges: Sequence[Values]
 ) -> tuple[Indices, Values, Masks, Values]:
     """Return a tree on bins as a row of each of a forest's arrays; its root comes first."""
-    feature, threshold = np.zeros(NODES, np.int32), np.full(NODES, GREATEST, np.float32)
+    feature, threshold = np.zeros(NODES, np.int32), np.full(NODES, stage.GREATEST, np.float32)
     kept, values = np.full(NODES, ALL, np.uint32), np.zeros(LEAVES, np.float32)
     leaves = {int(place): leaf for leaf, place in enumerate(_leaves(nodes, 0))}
     values[: len(leaves)] = nodes["value"][list(leaves)]
@@ -204,7 +194,7 @@ GEODESIC: Final = LayerSpec(
 )
 
 
-@stage_settings
+@stage.stage_settings
 class TreesSettings:
     """Settings of the boosted trees.
 
@@ -247,8 +237,8 @@ class Blend:
     """The blend of other drives; its log-odds are the last feature."""
 
     def __post_init__(self) -> None:
-        check_arrays(self, np.int32, sizes=("n", 2))
-        check_range("sizes", self.sizes, 1, GREATEST)
+        stage.check_arrays(self, np.int32, sizes=("n", 2))
+        stage.check_range("sizes", self.sizes, 1, stage.GREATEST)
         inputs = self.network.inputs
         if self.forest.inputs != inputs or (self.base and self.base.inputs != inputs - 1):
             raise ValueError("forest, network and base take different numbers of features")
@@ -312,7 +302,7 @@ def fit(sample: TrainingSet, settings: TreesSettings, base: Blend | None = None)
 def adapt(base: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
     """Learn from a drive's own pixels, on top of the model of other drives."""
     if base.base is not None:
-        raise MisfitError("the model was adapted to a drive already; train it again")
+        raise stage.MisfitError("the model was adapted to a drive already; train it again")
     check_fit(base, settings)
     return fit(sample, settings, base)
 
@@ -327,7 +317,7 @@ def check_fit(learnt: Blend, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
     computed = len(names_of(settings.features))
     if settings.opinion == (learnt.inputs == computed) or learnt.inputs < computed:
-        raise MisfitError(
+        raise stage.MisfitError(
             f"the model's trees were grown on {learnt.inputs} features of a pixel, and this "
             f"version computes {computed}; train it again"
         )
@@ -393,7 +383,7 @@ STAGE: Final = Stage(
     fit=fit,
     adapt=adapt,
     parameters=Blend,
-    oracle=perfect_mask,
+    oracle=stage.perfect_mask,
     inference_only=("reach_weight", "threshold"),
     hears=lambda settings: settings.opinion,
 )

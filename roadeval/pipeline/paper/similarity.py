@@ -12,15 +12,8 @@ from pydantic import Field
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
 from roadeval.data.arrays import Floats
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.stage import (
-    Output,
-    Stage,
-    TrainingSet,
-    View,
-    check_arrays,
-    check_range,
-    stage_settings,
-)
+from roadeval.pipeline import stage
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
 RIDGE: Final = 1.0
 """Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is
@@ -29,7 +22,7 @@ inverse of a singular covariance is lost in rounding."""
 SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
 
-@stage_settings
+@stage.stage_settings
 class SimilaritySettings:
     """Settings of phase 1.
 
@@ -49,9 +42,9 @@ class RoadColour:
     covariance: Floats
 
     def __post_init__(self) -> None:
-        check_arrays(self, np.float64, mean=(3,), covariance=(3, 3))
-        check_range("mean", self.mean, 0, 255)
-        check_range("covariance", self.covariance, -(255**2), 255**2)
+        stage.check_arrays(self, np.float64, mean=(3,), covariance=(3, 3))
+        stage.check_range("mean", self.mean, 0, 255)
+        stage.check_range("covariance", self.covariance, -(255**2), 255**2)
         # A single grey level has no variance; rounding may make it slightly negative.
         if np.linalg.eigvalsh(self.covariance)[0] < -1e-6:
             raise ValueError("covariance is not positive semi-definite")

@@ -13,6 +13,7 @@ from pydantic import Field
 from roadeval.data import Layer, Packed, mask_spec
 from roadeval.data.arrays import Floats, Plane, Words
 from roadeval.kernels import KERNELS
+from roadeval.pipeline import stage
 from roadeval.pipeline.colour_table import (
     EPS,
     LEVELS,
@@ -21,16 +22,7 @@ from roadeval.pipeline.colour_table import (
     sums_of_terms,
     table_of,
 )
-from roadeval.pipeline.stage import (
-    Output,
-    Stage,
-    TrainingSet,
-    View,
-    check_arrays,
-    check_range,
-    perfect_mask,
-    stage_settings,
-)
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
@@ -41,7 +33,7 @@ _BLOCK: Final = 1 << 17
 """Kernel values computed at once: 1 MB of float64; a few such arrays fit in the cache."""
 
 
-@stage_settings
+@stage.stage_settings
 class SvmSettings:
     """Settings of phase 3.
 
@@ -76,9 +68,9 @@ class SupportVectors:
 
     def __post_init__(self) -> None:
         shapes = {"mean": (3,), "scale": (3,), "vectors": ("m", 3), "weights": ("m",)}
-        check_arrays(self, np.float64, **shapes, offset=())
-        check_range("mean", self.mean, 0, 255)
-        check_range("scale", self.scale, 1e-6, 255)
+        stage.check_arrays(self, np.float64, **shapes, offset=())
+        stage.check_range("mean", self.mean, 0, 255)
+        stage.check_range("scale", self.scale, 1e-6, 255)
 
 
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
@@ -179,6 +171,6 @@ STAGE: Final = Stage(
     layers=(SVM,),
     fit=fit,
     parameters=SupportVectors,
-    oracle=perfect_mask,
+    oracle=stage.perfect_mask,
     inference_only=("threshold",),
 )
