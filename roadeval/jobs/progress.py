@@ -10,8 +10,8 @@ from dataclasses import dataclass
 class Progress:
     """How far a job is: ``done`` of ``total`` frames of ``stage``.
 
-    ``stage`` is ``looking``, ``training``, ``replaying``, ``writing``, ``reading``, ``rendering``
-    or ``verifying``; ``total`` is None where it is not known.
+    ``stage`` is ``looking``, ``training``, ``replaying``, ``writing``, ``reading``, ``rendering``,
+    ``comparing`` or ``verifying``; ``total`` is None where it is not known.
     """
 
     done: int

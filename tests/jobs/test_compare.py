@@ -48,6 +48,17 @@ def test_the_drives_that_are_worse_are_found_and_no_others(compared):
     assert compared.sides == ()
 
 
+def test_a_comparison_that_lasts_tells_how_many_drives_are_done(fleets, monkeypatch):
+    told = []
+    compare(fleets, on_progress=told.append)
+    assert told == []
+    monkeypatch.setattr("roadeval.jobs.results.compare.SILENT_S", -1.0)
+    monkeypatch.setattr("roadeval.evaluation.comparison.compare.FRAMES", 80)
+    compare(fleets, on_progress=told.append)
+    assert [progress.done for progress in told] == [0, 4, 8, 12]
+    assert {(progress.total, progress.stage) for progress in told} == {(16, "comparing")}
+
+
 def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     drive = write_log(tmp_path / "drive.mcap")

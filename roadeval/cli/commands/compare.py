@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-from roadeval.cli import arguments, console, messages
+from roadeval.cli import arguments, console, messages, progress
 
 Results = Annotated[
     list[str],
@@ -76,7 +76,10 @@ def compare(
     files = [(path, "") for path in output or ()]
     files += [(path, kind) for path, kind in ((junit, "junit"), (markdown, "comment")) if path]
     with holding(*(path for path, _ in files), inputs=list_results(results)):
-        compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
+        with progress.show(quiet or json) as watch:
+            compared = comparing.compare(
+                results, variants=variant, fail_if=fail_if or [], on_progress=watch
+            )
         for path, kind in files:
             comparing.write(compared, path, kind, typed)
     if json:

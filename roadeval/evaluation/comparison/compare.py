@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 FALSE: Final = 0.05
 """The share of the drives called changed that may be false, on average."""
-FRAMES: Final = 20_000
+FRAMES: Final = 5_000
 """Evaluated frames of a new result that are in memory together; one drive may have more."""
 _OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
 """Settings that change the frames and their truth, and not the method."""

@@ -185,7 +185,8 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     sides = []
     for table, end in ((base, "_base"), (new, "")):
         keys = {"stage": f"stage{end}", "frame": f"frame{end}"}
-        rows = table.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
+        rows = table[table["stage"].isin(numbered[f"stage{end}"].unique())]
+        rows = rows.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
         rows = numbered.astype({f"stage{end}": "str", **dict.fromkeys(by, "str")}).merge(rows)
         sides.append(rows[[*on, *COUNTS]])
     both = sides[0].merge(sides[1], on=on, how="outer", suffixes=("_base", ""), indicator="in")

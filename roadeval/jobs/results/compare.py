@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,6 +18,7 @@ from roadeval.evaluation.comparison.conditions import Condition, Judgement, judg
 from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
+from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.results.history import last_good
 from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.report.chart import Chart, looks, looks_of_results
@@ -33,6 +36,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from roadeval.report.blocks import Report
+
+
+SILENT_S: Final = 1.0
+"""Seconds of a comparison after which its progress is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +62,11 @@ class Compared:
 
 
 def compare(
-    results: Paths, *, variants: Sequence[str] | None = None, fail_if: Sequence[str] = ()
+    results: Paths,
+    *,
+    variants: Sequence[str] | None = None,
+    fail_if: Sequence[str] = (),
+    on_progress: OnProgress = ignore,
 ) -> Compared:
     """Compare results with the first of them, or the variants of one result with each other.
 
@@ -79,7 +90,7 @@ def compare(
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
-    paths[:1] = paths[:1] if across else [last_good(paths[0], paths[1:])]
+    paths[:1] = paths[:1] if across else [last_good(paths[0], paths[1:], on_progress)]
     opened = [Result(path) for path in paths]
     if across:
         opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
@@ -88,14 +99,24 @@ def compare(
     else:
         sides = _choose_sides(opened, _name_results(paths), variants)
     settings = opened[0].facts.evaluation
-    comparison = compare_sides(sides, settings, across_variants=across)
+    drives, total = list[tuple[str, str]](), sum(len(side.scored) for side in sides)
+    begun = time.monotonic()
+
+    def read(side: Side, name: str, keys: Collection[tuple[str, str]]) -> pd.DataFrame:
+        if name == "frames" and time.monotonic() - begun > SILENT_S:
+            on_progress(Progress(len(drives), total, "comparing", unit="drives"))
+        drives.extend(keys if name == "frames" else ())
+        return side.tables(name, keys)
+
+    watched = [replace(side, tables=partial(read, side)) for side in sides]
+    comparison = compare_sides(watched, settings, across_variants=across)
     labelled = [*zip(sides, opened, strict=True)]
     cut = dict.fromkeys(
         result.name if across else side.label for side, result in labelled if not result.complete
     )
-    partial = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
+    ends = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
     lost = dict.fromkeys(filter(None, map(_failure_sentence, opened)))
-    comparison = replace(comparison, warnings=(*lost, *partial, *comparison.warnings))
+    comparison = replace(comparison, warnings=(*lost, *ends, *comparison.warnings))
     alone = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: result.drive

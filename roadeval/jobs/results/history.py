@@ -170,14 +170,16 @@ def find_results(path: Path) -> list[Path]:
     return folders or recordings
 
 
-def last_good(path: Path, besides: Sequence[Path]) -> Path:
+def last_good(path: Path, besides: Sequence[Path], on_progress: OnProgress = ignore) -> Path:
     """Return a result's path, or of a folder of runs the newest that no lasting step made worse.
 
     Results ``besides`` are no runs of the folder.
     """
     taken = {other.resolve() for other in besides}
     paths = [result for result in find_results(path) if result.resolve() not in taken]
-    return Path(history(paths).last_good.paths[0]) if len(paths) > 1 else (paths or [path])[0]
+    if len(paths) < 2:
+        return (paths or [path])[0]
+    return Path(history(paths, on_progress=on_progress).last_good.paths[0])
 
 
 def _runs_in_order(
