@@ -38,9 +38,9 @@ def concatenate(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     """Concatenate tables; a column is a categorical if it is one in any of them."""
     import pandas as pd
 
-    given = [*tables]
-    parts = [part for part in given if len(part)] or given[:1]
-    words = {n: None for part in given for n in part.columns[part.dtypes == "category"]}
+    all_parts = [*tables]
+    parts = [part for part in all_parts if len(part)] or all_parts[:1]
+    words = {n: None for part in all_parts for n in part.columns[part.dtypes == "category"]}
     for name in words if len(parts) > 1 else ():
         columns = [part[name].astype("category") for part in parts]
         # A column without any word has no categories of text.

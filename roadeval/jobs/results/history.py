@@ -285,7 +285,7 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     columns = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
-    # Of other categories a merge would make texts.
+    # A merge over other categories would make texts of them.
     rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=key)
     return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
