@@ -58,7 +58,7 @@ def clip(
         none = "no pictures of such frames were kept; --record keeps some, and in a fleet --keep"
         raise RoadevalError(one if scenes else none, where=place if scenes else result)
     # With its matrix stated, no player guesses it from the size. With x264's tree of macroblocks
-    # (build 165), one encoding in a hundred of equal pictures has other bytes.
+    # (build 165, AVX-512), one encoding in a hundred of equal pictures has other bytes.
     options = {"crf": "20", "preset": "veryfast", "colorspace": "smpte170m"}
     options["x264-params"] = "mbtree=0"
     total = sum(len(numbers) for _, numbers, _ in scenes)
