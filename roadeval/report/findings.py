@@ -145,7 +145,7 @@ class Findings:
         maps = {}
         for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))
-            maps[name] = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
+            maps[name] = np.zeros((2, rows.max() + 1, columns.max() + 1))
             maps[name][:, rows, columns] = cells[["FP", "FN"]].div(cells["labelled"], axis=0).T
         return maps
 

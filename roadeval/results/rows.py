@@ -107,16 +107,17 @@ def sum_rows(
 ) -> dict[str, list[Row]]:
     """Return the rows of each table of sums over the drive; ``classes`` are those of its truth.
 
-    Cells of heat maps that are never labelled, and levels of probabilities that do not occur, are
-    left out.
+    Levels of probabilities that do not occur are left out, and cells of heat maps that are labelled
+    and have no error. The last cell has a row, as it gives the map's size, if any cell is labelled.
     """
-    heat: list[Row] = []
+    heat, probabilities = list[Row](), list[Row]()
     for variant, heat_map in board.heat.items():
         side, sums = heat_map.cells()
-        tops, lefts = sums[0].nonzero()
+        has_row = (sums[0] == 0) | sums[1:].any(axis=0)
+        has_row[-1, -1] = True
+        tops, lefts = (has_row & sums[0].any()).nonzero()
         cells = (tops * side, lefts * side, np.full_like(tops, side), *sums[:, tops, lefts])
         heat += [(variant, *cell) for cell in np.column_stack(cells).tolist()]
-    probabilities: list[Row] = []
     for name, counts in board.curves.counts.items():
         other, road = at_levels(counts)
         levels = (other + road).nonzero()[0]

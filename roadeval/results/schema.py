@@ -348,7 +348,7 @@ _ROWS: Final = {
     "edges": "A row per evaluated frame, final mask and place where the road ends, in metres.",
     "windows": "A row per window of consecutive evaluated frames, variant and stage.",
     "changes": "A row per mask and the one before: stage to stage, final mask to final mask.",
-    "heat": "A row per variant and square cell of the image: where the final mask errs.",
+    "heat": "A row per variant and cell with an error or without a label, and for the last cell.",
     "probabilities": "A row per variant, stage and level of its road probability, for curves.",
     "classes": "A row per final mask and class of the truth, where the truth has classes.",
     "metres": "A row per final mask and measure on the ground; see the how-to on metres.",

@@ -24,52 +24,71 @@ def changes(masks, truth):
     return counts.changes([(variant, stage) for variant, stage, _ in masks], bits, packed)
 
 
-def heat_of(*masks, truth=TRUTH):
+SIDE = 8
+
+
+def enlarged(*rows):
+    """Read an image from text of which each character is a cell of 8 x 8 pixels."""
+    return np.kron(pixels(*rows), np.ones((SIDE, SIDE), np.uint8))
+
+
+CELLS = enlarged("##..", "##.?")
+
+
+def heat_of(*masks, truth=CELLS):
     heat = HeatMap()
     for mask in masks:
         heat.add(error_map(mask, truth).array)
     return heat
 
 
-def test_a_heat_map_counts_labels_false_positives_and_negatives_pixel_by_pixel():
-    side, (labelled, fp, fn) = heat_of(pixels("#..#", "##.#"), pixels("#..#", "##..")).cells()
-    assert side == 1
-    assert labelled.tolist() == [[2, 2, 2, 2], [2, 2, 2, 0]]
-    assert fp.tolist() == [[0, 0, 0, 2], [0, 0, 0, 0]]
-    assert fn.tolist() == [[0, 2, 0, 0], [0, 0, 0, 0]]
+def test_a_heat_map_counts_labels_false_positives_and_negatives_in_each_cell():
+    masks = enlarged("#..#", "##.#"), enlarged("#..#", "##..")
+    side, sums = heat_of(*masks).cells()
+    labelled, fp, fn = (sums / SIDE**2).tolist()
+    assert side == SIDE
+    assert labelled == [[2, 2, 2, 2], [2, 2, 2, 0]]
+    assert fp == [[0, 0, 0, 2], [0, 0, 0, 0]]
+    assert fn == [[0, 2, 0, 0], [0, 0, 0, 0]]
+
+
+@pytest.mark.parametrize(("width", "side"), [(4, 8), (1280, 8), (1281, 9), (1920, 12)])
+def test_a_cell_has_eight_pixels_a_side_or_is_one_of_160_across(width, side):
+    truth = np.zeros((3, width), np.uint8)
+    assert heat_of(truth, truth=truth).cells()[0] == side
 
 
 def test_a_frame_of_another_size_is_left_out():
-    heat = heat_of(TRUTH % 2)
+    heat = heat_of(enlarged("##..", "##.."))
     heat.add(np.zeros((1, 1), np.uint8))
     assert heat.frames == 1
 
 
 @pytest.mark.parametrize("frames", [254, 255, 256, 511])
 def test_a_sum_that_does_not_fit_in_a_byte_is_carried(frames):
-    heat = heat_of(*[pixels("#..#", "##..")] * frames)
-    assert heat.cells()[1][1, 0, 3] == frames
-    assert heat.cells()[1][1, 0, 3] == frames
+    heat = heat_of(*[enlarged("#..#", "##..")] * frames)
+    assert heat.cells()[1][1, 0, 3] == frames * SIDE**2
+    assert heat.cells()[1][1, 0, 3] == frames * SIDE**2
 
 
 def test_a_large_map_is_summed_up_in_square_cells_and_loses_nothing():
     truth = np.zeros((201, 322), np.uint8)
     mask = np.random.default_rng(0).integers(0, 2, truth.shape, np.uint8)
     side, cells = heat_of(mask, truth=truth).cells()
-    assert (side, cells.shape) == (3, (3, 67, 108))
-    assert cells[1, 1, 2] == mask[3:6, 6:9].sum()
+    assert (side, cells.shape) == (SIDE, (3, 26, 41))
+    assert cells[1, 1, 2] == mask[8:16, 16:24].sum()
     assert cells[1].sum() == mask.sum()
-    assert cells[0, 0, 107] == 3
+    assert cells[0, 0, 40] == 16
 
 
 def test_a_large_map_carried_between_bytes_and_cells_loses_nothing():
-    truth = np.zeros((170, 200), np.uint8)
+    truth = np.zeros((160, 200), np.uint8)
     masks = np.random.default_rng(0).integers(0, 2, (5, *truth.shape), np.uint8)
     heat = heat_of(*[mask for mask in masks for _ in range(103)], truth=truth)
     total = 103 * masks.sum(axis=0, dtype=np.int64)
     side, cells = heat.cells()
-    assert side == 2
-    assert cells[1].tolist() == total.reshape(85, 2, 100, 2).sum(axis=(1, 3)).tolist()
+    assert side == SIDE
+    assert cells[1].tolist() == total.reshape(20, 8, 25, 8).sum(axis=(1, 3)).tolist()
 
 
 def test_changes_are_from_stage_to_stage_and_from_final_mask_to_final_mask():

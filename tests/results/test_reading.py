@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import Counts
+from roadeval.data.arrays import FN, FP, IGNORED
 from roadeval.evaluation import metrics
 from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
@@ -129,6 +130,26 @@ def test_a_level_with_as_many_pixels_of_road_as_of_the_rest_has_a_row():
     rows = sum_rows(board, windows(NOTHING, 10))
     assert rows.pop("probabilities") == [("net", "post", 1, 4, 4)]
     assert not any(rows.values())
+
+
+def heat_rows(*cells):
+    """The rows of ``heat`` of one frame, of which each number is the error of a whole cell."""
+    board = Scoreboard(KEY, EvaluationSettings(), ["net"], None)
+    board.heat["net"].add(np.kron(np.array(cells, np.uint8), np.ones((8, 8), np.uint8)))
+    return sum_rows(board, windows(NOTHING, 10))["heat"]
+
+
+def test_cells_with_errors_or_without_a_label_have_a_row_and_so_has_the_last_one():
+    assert heat_rows([0, FP, 1], [IGNORED, FN, 0]) == [
+        ("net", 0, 8, 8, 64, 64, 0),
+        ("net", 8, 0, 8, 0, 0, 0),
+        ("net", 8, 8, 8, 64, 0, 64),
+        ("net", 8, 16, 8, 64, 0, 0),
+    ]
+
+
+def test_a_heat_map_without_any_label_has_no_row():
+    assert heat_rows([IGNORED, IGNORED]) == []
 
 
 # --- Scores of any number of drives ---------------------------------------------------------------

@@ -159,8 +159,8 @@ PENDING: Final = 255
 class HeatMap:
     """Counts of how often each pixel was labelled, a false positive and a false negative.
 
-    They are summed up in square cells, `CELLS` across the longer side at most: a sum for each pixel
-    would take a large part of a run's memory. Frames of another size than the first are left out.
+    They are summed up in square cells of at least 8 pixels a side, `CELLS` across at most: a sum
+    per pixel takes much memory and disk. Frames of another size than the first are left out.
     """
 
     def __init__(self) -> None:
@@ -172,7 +172,7 @@ class HeatMap:
     def add(self, errors: Plane) -> None:
         """Add a frame's errors, ``(H, W)`` uint8 in the classes of `roadeval.data.ERRORS`."""
         if not self.frames:
-            self._side = max(1, -(-max(errors.shape) // CELLS))
+            self._side = max(8, -(-max(errors.shape) // CELLS))
             self._bytes = np.zeros((3, *errors.shape), np.uint8)
             self._sums = np.zeros((3, *(-(-n // self._side) for n in errors.shape)), np.int64)
         if errors.shape != self._bytes.shape[1:]:
@@ -180,8 +180,7 @@ class HeatMap:
         if self.frames and self.frames % PENDING == 0:
             self._carry()
         self.frames += 1
-        counted = errors != IGNORED, errors == FP, errors == FN
-        self._bytes += np.array(counted)
+        self._bytes += np.array([errors != IGNORED, errors == FP, errors == FN])
 
     def cells(self) -> tuple[int, Sums]:
         """Return the cells' side in pixels, and their sums.

@@ -239,6 +239,16 @@ def test_an_interval_of_errors_ends_at_what_an_error_can_be():
     assert 0.05 < high < 1
 
 
+def test_a_heat_map_has_zeros_where_no_row_is_and_tells_places_that_are_never_labelled():
+    columns = ["variant", "top", "left", "side", "labelled", "FP", "FN"]
+    rows = [("net", 0, 8, 8, 20, 5, 1), ("net", 8, 0, 8, 0, 0, 0), ("net", 8, 16, 8, 20, 0, 0)]
+    table = pd.DataFrame(rows, columns=columns)
+    (shares,) = some_findings(table=lambda _: table).heatmaps.values()
+    nan = math.nan
+    expected = [[[0, 0.25, 0], [nan, 0, 0]], [[0, 0.05, 0], [nan, 0, 0]]]
+    np.testing.assert_equal(shares, np.array(expected))
+
+
 def headings(made):
     return [block.text for block in made.blocks if isinstance(block, Heading) and block.level == 1]
 
