@@ -226,7 +226,13 @@ class Partners:
             return None
         images, labels = self._around(stamp)
         reach = None if self._few else self._pairing.reach_ns
-        middle = _seek(labels, stamp, _expected_position(labels, stamp, self.near))
+        near = self.near
+        if isinstance(labels, TopicReader) and (there := labels.stamp(near)) != UNREADABLE:
+            # Begin where the stamp is if its delay to the log time is the last label's.
+            logged = int(labels.log_times[near]) - there + stamp
+            place = np.searchsorted(labels.log_times, min(max(logged, -(2**63)), 2**63 - 1))
+            near = min(int(place), len(labels) - 1)
+        middle = _seek(labels, stamp, near)
         equal = _find_equal(labels, stamp, middle, reach)
         if self._pairing.is_small and (not equal or equal[0] in self.used):
             if image in self._all_equal:
@@ -342,15 +348,6 @@ def _window(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> range
         too_late = (at for at in right if stamps.stamp(at) > stamp + reach)
         first, last = next(too_early, first), next(too_late, last)
     return range(first, last + 1)
-
-
-def _expected_position(stamps: Stamps, stamp: int, near: int) -> int:
-    """Return the position of a stamp if its delay to the log time is that of ``near``."""
-    if not isinstance(stamps, TopicReader) or (there := stamps.stamp(near)) == UNREADABLE:
-        return near
-    logged = int(stamps.log_times[near]) - there + stamp
-    place = np.searchsorted(stamps.log_times, min(max(logged, -(2**63)), 2**63 - 1))
-    return min(int(place), len(stamps) - 1)
 
 
 def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
