@@ -489,7 +489,13 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
     certain number, and no label. A `LogError` if no label has the number of a frame.
     """
-    frames, shown = len(images), _numbers_as_shown(images)
+    frames = len(images)
+    shown: Sequence[int] = range(frames)
+    with suppress(FrameError):
+        # A video with B-frames is numbered in the order of stamps.
+        if not _rise(images) and codec_of(images.picture(0)):
+            stamps = [images.stamp(position) for position in range(frames)]
+            shown = np.argsort(np.argsort(stamps, kind="stable")).tolist()
     if isinstance(labels, TopicReader):
         first = settings.first or 0
         certain = labels.sure - first if labels.sure < len(labels) else frames
@@ -523,13 +529,3 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     unsure = frames - images.sure
     numbers = Times(shown, images.sure)
     return Pairing(numbers, labels, 0, by=labels.by, unused=unused, unsure=unsure)
-
-
-def _numbers_as_shown(images: TopicReader) -> Sequence[int]:
-    """Return the number of each image; a video with B-frames is numbered in the order of stamps."""
-    with suppress(FrameError):
-        if not _rise(images) and codec_of(images.picture(0)):
-            stamps = [images.stamp(position) for position in range(len(images))]
-            ranks: list[int] = np.argsort(np.argsort(stamps, kind="stable")).tolist()
-            return ranks
-    return range(len(images))
