@@ -194,19 +194,14 @@ def ground_of(
     """
     if size is None or (logged is None and not settings.given):
         return None, ""
-    lens, why = _find_lens(logged, settings, size)
-    if settings.homography:
-        plane, is_posed, text = _plane_of_homography(settings, lens)
-        width, height = settings.size or size
-        lens = lens or Calibration("", width, height, _flat(np.eye(3)))
-    elif lens is None:
-        return None, Sentence("no metres: {}", why)
-    else:
-        (above, pitch, roll), text = _find_pose(logged.mounting if logged else None, settings)
-        if above is None or pitch is None:
-            return None, Sentence("no metres: {}", text)
-        turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll)).T
-        plane, is_posed = _plane(turn, np.array([0.0, 0.0, above])), True
+    lens, text = _find_lens(logged, settings, size)
+    plane: tuple[float, ...] | None = None
+    if lens is not None or settings.homography:
+        plane, is_posed, text = _find_plane(logged.mounting if logged else None, settings, lens)
+    if plane is None:
+        return None, Sentence("no metres: {}", text)
+    width, height = settings.size or size
+    lens = lens or Calibration("", width, height, _flat(np.eye(3)))
     parts = lens.width, lens.height, lens.matrix, plane, lens.model, lens.distortion
     ground = Ground(*parts, is_posed=is_posed).scaled(*size)
     # Pixels all over the image, up to its edges.
@@ -262,10 +257,22 @@ def _find_lens(
     return replace(lens, model=model, distortion=numbers), ""
 
 
-def _find_pose(
-    mounting: Mounting | None, settings: GroundSettings
-) -> tuple[tuple[float | None, float | None, float], str]:
-    """Return height, pitch and roll, and their text; or None, and what is missing."""
+def _find_plane(
+    mounting: Mounting | None, settings: GroundSettings, lens: Calibration | None
+) -> tuple[tuple[float, ...] | None, bool, str]:
+    """Return `Ground.plane`, whether it is posed, and its source; or None, and what is missing."""
+    if settings.homography:
+        to_ground = np.reshape(settings.homography, (3, 3))
+        if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
+            raise GroundError("cannot be inverted", setting="ground.homography")
+        matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
+        from_ground = np.linalg.inv(to_ground @ matrix)
+        # Distant places ahead must lie before the camera, not behind it.
+        sign = 1 if from_ground[2, 0] > 0 else -1
+        from_ground = from_ground / np.linalg.norm(from_ground[:, 0]) * sign
+        ahead, across, _ = from_ground.T
+        is_square = abs(np.linalg.norm(across) - 1) < 0.05 > abs(ahead @ across)
+        return _flat(from_ground), lens is not None and bool(is_square), "by a homography"
     height, pitch, roll = settings.height, settings.pitch, settings.roll
     if mounting is not None:
         turn = _rotation_of(mounting.rotation) @ AXES  # its first axis is ahead
@@ -284,27 +291,14 @@ def _find_pose(
         missing = [f"the camera's height above the ground{above}"] * has_no_height
         missing += ["its pitch"] * (pitch is None)
         text = "missing: {}; give it with {ground}"
-        return (None, None, 0.0), Sentence(text, ", and ".join(missing))
+        return None, False, Sentence(text, ", and ".join(missing))
     # Adding 0 turns -0.0 into 0.0.
     shown = [f"{round(angle or 0.0, 1) + 0.0}\N{DEGREE SIGN}" for angle in (abs(pitch), roll)]
     way = "up" if pitch < 0 else "down"
     text = f"camera {height:.2f} m above it, pitch {shown[0]} {way}, roll {shown[1]}"
-    return (height, pitch, roll or 0.0), text + " (not given)" * (roll is None)
-
-
-def _plane_of_homography(
-    settings: GroundSettings, lens: Calibration | None
-) -> tuple[tuple[float, ...], bool, str]:
-    to_ground = np.reshape(settings.homography, (3, 3))
-    if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
-        raise GroundError("cannot be inverted", setting="ground.homography")
-    matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
-    plane = np.linalg.inv(to_ground @ matrix)
-    # Distant places ahead must lie before the camera, not behind it.
-    plane = plane / np.linalg.norm(plane[:, 0]) * (1 if plane[2, 0] > 0 else -1)
-    ahead, across, _ = plane.T
-    is_square = abs(np.linalg.norm(across) - 1) < 0.05 > abs(ahead @ across)
-    return _flat(plane), lens is not None and bool(is_square), "by a homography"
+    turn = AXES @ (_rotation(LEFT, pitch) @ _rotation(AHEAD, roll or 0.0)).T
+    plane = _plane(turn, np.array([0.0, 0.0, height]))
+    return plane, True, text + " (not given)" * (roll is None)
 
 
 def _plane(turn: Floats, at: Floats) -> tuple[float, ...]:

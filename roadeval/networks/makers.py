@@ -105,7 +105,14 @@ def input_settings(folder: Path, content: bytes) -> NetSettings:
         if (resample := made.get("resample", 2)) not in (2, 3):
             problem = f"asks for resample {resample!r}; only 2 and 3 are known"
             raise NetworkError(problem, where=path, remedy="set resample to 2, the bilinear filter")
-        values |= {"antialias": FILTERS[resample], "size": _size(made)}
+        values["antialias"] = FILTERS[resample]
+        size = made.get("size")
+        kind = made.get("image_processor_type", made.get("feature_extractor_type"))
+        # Otherwise the size is not stated, or depends on the frame.
+        if isinstance(size, dict) and {"width", "height"} <= size.keys():
+            values["size"] = [size["width"], size["height"]]
+        elif isinstance(size, int) and "Segformer" in str(kind):
+            values["size"] = [size, size]
     values["scale"] = made.get("rescale_factor", 1 / 255) if made.get("do_rescale", True) else 1.0
     if made.get("do_normalize", True):
         for key, name in (("image_mean", "mean"), ("image_std", "deviation")):
@@ -116,15 +123,6 @@ def input_settings(folder: Path, content: bytes) -> NetSettings:
         values["channels"] = "bgr"
     with reading(path, "damaged"):
         return NetSettings(**values)
-
-
-def _size(made: Mapping[str, Any]) -> list[Any] | None:
-    """Return width and height of the input; None if they depend on the frame, or are not stated."""
-    size = made.get("size")
-    if isinstance(size, dict) and {"width", "height"} <= size.keys():
-        return [size["width"], size["height"]]
-    kind = made.get("image_processor_type", made.get("feature_extractor_type"))
-    return [size, size] if isinstance(size, int) and "Segformer" in str(kind) else None
 
 
 def _table(content: bytes) -> dict[str, Any]:

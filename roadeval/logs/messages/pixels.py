@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -48,29 +48,35 @@ class PixelFormat:
         return self.code == "COLOR_GRAY2RGB"
 
 
-def _make_formats() -> dict[str, PixelFormat]:
-    uyvy = PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1))
-    yuy2 = replace(uyvy, code="COLOR_YUV2RGB_YUY2")
-    formats = {"yuv422": uyvy, "uyvy": uyvy, "yuyv": yuy2, "yuv422_yuy2": yuy2}
-    for name in ("nv12", "nv21"):
-        formats[name] = PixelFormat("u1", 1, f"COLOR_YUV2RGB_{name.upper()}", 1.5, (2, 2))
-    formats["nv24"] = PixelFormat("u1", 1, "COLOR_YUV2RGB_YUY2", 3)
-    for name, dtype in (("32fc1", "f4"), ("8sc1", "i1"), ("16sc1", "i2"), ("32sc1", "i4")):
-        formats[name] = PixelFormat(dtype, 1, "COLOR_GRAY2RGB")
-    for bits, dtype in (("8", "u1"), ("16", "u2")):
-        codes = ((1, "GRAY"), (3, "BGR"), (4, "BGRA"))
-        grey, bgr, bgra = (PixelFormat(dtype, n, f"COLOR_{code}2RGB") for n, code in codes)
-        formats |= {f"mono{bits}": grey, f"{bits}uc1": grey, f"bgr{bits}": bgr}
-        formats |= {f"{bits}uc3": bgr, f"bgra{bits}": bgra, f"{bits}uc4": bgra}
-        formats[f"rgb{bits}"] = PixelFormat(dtype, 3, None)
-        formats[f"rgba{bits}"] = PixelFormat(dtype, 4, "COLOR_RGBA2RGB")
-        for order in ("rggb", "bggr", "grbg", "gbrg"):
-            code = f"COLOR_Bayer{order.upper()}2RGB"
-            formats[f"bayer_{order}{bits}"] = PixelFormat(dtype, 1, code)
-    return formats
-
-
-FORMATS: Final = _make_formats()
+FORMATS: Final = {
+    "yuv422": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
+    "uyvy": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
+    "yuyv": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
+    "yuv422_yuy2": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
+    "nv12": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV12", 1.5, (2, 2)),
+    "nv21": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV21", 1.5, (2, 2)),
+    "nv24": PixelFormat("u1", 1, "COLOR_YUV2RGB_YUY2", 3),
+    "32fc1": PixelFormat("f4", 1, "COLOR_GRAY2RGB"),
+    "8sc1": PixelFormat("i1", 1, "COLOR_GRAY2RGB"),
+    "16sc1": PixelFormat("i2", 1, "COLOR_GRAY2RGB"),
+    "32sc1": PixelFormat("i4", 1, "COLOR_GRAY2RGB"),
+    **{
+        name.format(bits): PixelFormat(dtype, channels, code)
+        for bits, dtype in ((8, "u1"), (16, "u2"))
+        for names, channels, code in (
+            ("mono{} {}uc1", 1, "COLOR_GRAY2RGB"),
+            ("bgr{} {}uc3", 3, "COLOR_BGR2RGB"),
+            ("bgra{} {}uc4", 4, "COLOR_BGRA2RGB"),
+            ("rgb{}", 3, None),
+            ("rgba{}", 4, "COLOR_RGBA2RGB"),
+            ("bayer_rggb{}", 1, "COLOR_BayerRGGB2RGB"),
+            ("bayer_bggr{}", 1, "COLOR_BayerBGGR2RGB"),
+            ("bayer_grbg{}", 1, "COLOR_BayerGRBG2RGB"),
+            ("bayer_gbrg{}", 1, "COLOR_BayerGBRG2RGB"),
+        )
+        for name in names.split()
+    },
+}
 """Every raw encoding, by its name in lower case."""
 
 

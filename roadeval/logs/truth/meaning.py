@@ -27,7 +27,6 @@ from roadeval.data import (
     Classes,
     Mask,
     Probability,
-    Rgb,
     Truth,
     TruthClass,
 )
@@ -253,10 +252,14 @@ def count_values(
     if it has colours, but the settings name none, or if it is compressed with loss.
     """
     if format_ := lossy_format(picture):
-        if file is not None and labels == LabelSettings() and _is_blurred(to_rgb(picture, limits)):
-            command = f"mkdir png && python -c '{_REPAIR % file.suffix}' {shlex.quote(name)}"
-            reason = "holds masks whose compression blurs their edges; make a new folder"
-            raise LogError(f"{name} {reason}: {command}")
+        if file is not None and labels == LabelSettings():
+            colours, most = to_rgb(picture, limits), 48  # JPEG may move the levels so far
+            is_grey = np.ptp(colours.astype(np.int16), axis=2).max() <= most
+            is_black, is_white = colours[..., 0] <= most, colours[..., 0] >= 255 - most
+            if is_grey and is_white.any() and np.mean(~is_black & ~is_white) <= RARE:
+                command = f"mkdir png && python -c '{_REPAIR % file.suffix}' {shlex.quote(name)}"
+                reason = "holds masks whose compression blurs their edges; make a new folder"
+                raise LogError(f"{name} {reason}: {command}")
         raise LogError(lossy_labels(name, format_))
     pixels = to_rgb(picture, limits) if labels.road_colors else to_labels(picture, limits)
     packed = pixels if pixels.ndim == 2 else pack_colors(pixels)
@@ -274,14 +277,6 @@ _REPAIR: Final = (
     'import cv2, pathlib, sys; [cv2.imwrite(f"png/{f.stem}.png", cv2.threshold(cv2.imread(str(f), '
     '0), 127, 255, 0)[1]) for f in pathlib.Path(sys.argv[1]).rglob("*%s")]'
 )
-
-
-def _is_blurred(colours: Rgb) -> bool:
-    """Return whether an image is a mask of black and white with blurred edges."""
-    levels, most = colours[..., 0], 48  # JPEG may move the levels so far
-    is_grey = np.ptp(colours.astype(np.int16), axis=2).max() <= most
-    is_white = levels >= 255 - most
-    return bool(is_grey and is_white.any() and np.mean((levels > most) & ~is_white) <= RARE)
 
 
 def find_meaning(

@@ -226,7 +226,13 @@ class Partners:
             return None
         images, labels = self._around(stamp)
         reach = None if self._few else self._pairing.reach_ns
-        middle = _seek(labels, stamp, _expected_position(labels, stamp, self.near))
+        near = self.near
+        if isinstance(labels, TopicReader) and (there := labels.stamp(near)) != UNREADABLE:
+            # Begin where the stamp is if its delay to the log time is the last label's.
+            logged = int(labels.log_times[near]) - there + stamp
+            place = np.searchsorted(labels.log_times, min(max(logged, -(2**63)), 2**63 - 1))
+            near = min(int(place), len(labels) - 1)
+        middle = _seek(labels, stamp, near)
         equal = _find_equal(labels, stamp, middle, reach)
         if self._pairing.is_small and (not equal or equal[0] in self.used):
             if image in self._all_equal:
@@ -342,15 +348,6 @@ def _window(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> range
         too_late = (at for at in right if stamps.stamp(at) > stamp + reach)
         first, last = next(too_early, first), next(too_late, last)
     return range(first, last + 1)
-
-
-def _expected_position(stamps: Stamps, stamp: int, near: int) -> int:
-    """Return the position of a stamp if its delay to the log time is that of ``near``."""
-    if not isinstance(stamps, TopicReader) or (there := stamps.stamp(near)) == UNREADABLE:
-        return near
-    logged = int(stamps.log_times[near]) - there + stamp
-    place = np.searchsorted(stamps.log_times, min(max(logged, -(2**63)), 2**63 - 1))
-    return min(int(place), len(stamps) - 1)
 
 
 def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
@@ -492,7 +489,13 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
     certain number, and no label. A `LogError` if no label has the number of a frame.
     """
-    frames, shown = len(images), _numbers_as_shown(images)
+    frames = len(images)
+    shown: Sequence[int] = range(frames)
+    with suppress(FrameError):
+        # A video with B-frames is numbered in the order of stamps.
+        if not _rise(images) and codec_of(images.picture(0)):
+            stamps = [images.stamp(position) for position in range(frames)]
+            shown = np.argsort(np.argsort(stamps, kind="stable")).tolist()
     if isinstance(labels, TopicReader):
         first = settings.first or 0
         certain = labels.sure - first if labels.sure < len(labels) else frames
@@ -526,13 +529,3 @@ def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) 
     unsure = frames - images.sure
     numbers = Times(shown, images.sure)
     return Pairing(numbers, labels, 0, by=labels.by, unused=unused, unsure=unsure)
-
-
-def _numbers_as_shown(images: TopicReader) -> Sequence[int]:
-    """Return the number of each image; a video with B-frames is numbered in the order of stamps."""
-    with suppress(FrameError):
-        if not _rise(images) and codec_of(images.picture(0)):
-            stamps = [images.stamp(position) for position in range(len(images))]
-            ranks: list[int] = np.argsort(np.argsort(stamps, kind="stable")).tolist()
-            return ranks
-    return range(len(images))

@@ -223,6 +223,14 @@ def written(path: Path, name: str, content: Any) -> Path:
     return path / name
 
 
+@pytest.mark.parametrize("content", ["", " \n\n"])
+def test_a_file_of_yolo_without_labels_is_an_image_without_a_shape(tmp_path, content):
+    written(tmp_path, "1.txt", "0 .1 .1 .5 .1 .5 .5")
+    written(tmp_path, "2.txt", content)
+    notes = labels_in(tmp_path, SIZE).notes
+    assert notes == ("1 of 2 images have no shape, and count as not labelled",)
+
+
 def coco(segmentation: Any, **image: Any) -> dict[str, Any]:
     return {
         "images": [{"id": 1, "file_name": "1.png", "width": 48, "height": 32} | image],

@@ -89,25 +89,27 @@ def _flatbuffer(schema: Schema | None) -> MessageReader | None:
 
 
 def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
-    values = {name: _flatbuffer_field(message, name, kind) for name, kind in fields}
+    """Read fields by their accessors, such as ``frame_id`` by ``FrameId``."""
+    values: dict[str, Any] = {}
+    for name, kind in fields:
+        accessor = name.title().replace("_", "")
+        value: Any
+        if kind == "bytes":
+            value = memoryview(getattr(message, f"{accessor}AsNumpy")())
+        elif kind.endswith("]"):
+            items = map(getattr(message, accessor), range(getattr(message, f"{accessor}Length")()))
+            nested = NESTED.get(kind.partition("[")[0])
+            value = [_flatbuffer_fields(item, nested) if nested else item for item in items]
+        else:
+            value = getattr(message, accessor)()
+            if kind == "time":
+                value = SimpleNamespace(sec=value.Sec(), nanosec=value.Nsec()) if value else None
+            elif kind in NESTED:
+                value = _flatbuffer_fields(value, NESTED[kind])
+            elif kind == "str":
+                value = (value or b"").decode("utf-8", "replace")
+        values[name] = value
     return SimpleNamespace(**values)
-
-
-def _flatbuffer_field(message: Any, name: str, kind: str) -> Any:
-    """Read a field by its accessor, such as ``frame_id`` by ``FrameId``."""
-    accessor = name.title().replace("_", "")
-    if kind == "bytes":
-        return memoryview(getattr(message, f"{accessor}AsNumpy")())
-    if kind.endswith("]"):
-        items = map(getattr(message, accessor), range(getattr(message, f"{accessor}Length")()))
-        nested = NESTED.get(kind.partition("[")[0])
-        return [_flatbuffer_fields(item, nested) if nested else item for item in items]
-    value = getattr(message, accessor)()
-    if kind == "time":
-        return SimpleNamespace(sec=value.Sec(), nanosec=value.Nsec()) if value else None
-    if kind in NESTED:
-        return _flatbuffer_fields(value, NESTED[kind])
-    return (value or b"").decode("utf-8", "replace") if kind == "str" else value
 
 
 # --- JSON: bytes in base 64, or as a list of numbers ----------------------------------------------

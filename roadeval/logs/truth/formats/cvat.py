@@ -22,34 +22,31 @@ def _shapes(elements: Iterable[Element]) -> Iterator[shapes.Shape]:
     # Shapes of equal height stay in the order of the file. Datumaro writes shapes ``outside``, too.
     without_area = ("polyline", "points", "tag", "skeleton")
     for element in sorted(elements, key=lambda shape: float(shape.get("z_order", 0))):
-        if element.tag not in without_area and element.get("outside") != "1":
-            yield _shape(element)
-
-
-def _shape(element: Element) -> shapes.Shape:
-    label, at = element.attrib["label"], element.attrib
-    degrees = float(at.get("rotation", 0))
-    match element.tag:
-        case "polygon":
-            points = at["points"].replace(";", ",").split(",")
-            return shapes.Outline(label, [*map(float, points)])
-        case "box":
-            left, top, right, bottom = (float(at[name]) for name in ("xtl", "ytl", "xbr", "ybr"))
-            box = shapes.rectangle(label, left, top, right, bottom)
-            return box.rotate(degrees, ((left + right) / 2, (top + bottom) / 2))
-        case "ellipse":
-            x, y, across, down = (float(at[name]) for name in ("cx", "cy", "rx", "ry"))
-            return shapes.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
-        case "cuboid":
-            corners = [side + end for side in ("tl", "bl", "tr", "br") for end in "12"]
-            points = [at[axis + corner] for corner in corners for axis in "xy"]
-            return shapes.hull(label, [*map(float, points)])
-        case "mask":
-            left, top, width, height = (int(at[n]) for n in ("left", "top", "width", "height"))
-            lengths = [int(number) for number in at["rle"].split(",")]
-            return shapes.Runs(label, lengths, (left, top, width, height))
-        case other:
-            return shapes.Undrawn(label, other)
+        if element.tag in without_area or element.get("outside") == "1":
+            continue
+        label, at = element.attrib["label"], element.attrib
+        degrees = float(at.get("rotation", 0))
+        match element.tag:
+            case "polygon":
+                points = at["points"].replace(";", ",").split(",")
+                yield shapes.Outline(label, [*map(float, points)])
+            case "box":
+                left, top, right, bottom = (float(at[n]) for n in ("xtl", "ytl", "xbr", "ybr"))
+                box = shapes.rectangle(label, left, top, right, bottom)
+                yield box.rotate(degrees, ((left + right) / 2, (top + bottom) / 2))
+            case "ellipse":
+                x, y, across, down = (float(at[name]) for name in ("cx", "cy", "rx", "ry"))
+                yield shapes.ellipse(label, x, y, across, down).rotate(degrees, (x, y))
+            case "cuboid":
+                corners = [side + end for side in ("tl", "bl", "tr", "br") for end in "12"]
+                points = [at[axis + corner] for corner in corners for axis in "xy"]
+                yield shapes.hull(label, [*map(float, points)])
+            case "mask":
+                left, top, width, height = (int(at[n]) for n in ("left", "top", "width", "height"))
+                lengths = [int(number) for number in at["rle"].split(",")]
+                yield shapes.Runs(label, lengths, (left, top, width, height))
+            case other:
+                yield shapes.Undrawn(label, other)
 
 
 FORMATS: Final = (

@@ -13,12 +13,8 @@ from typing import Final
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import shapes
 
-_LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]", re.MULTILINE)
-"""The beginning of a line of labels, which lines with names of classes do not have."""
-
-
-def _is_yolo(_: Path, content: str) -> bool:
-    return not content.strip() or _LINE.search(content) is not None
+_LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]|\A\s*\Z", re.MULTILINE)
+"""The beginning of a line of labels, which lines with names of classes do not have; or no line."""
 
 
 def _read_yolo(path: Path, content: str, size: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
@@ -51,4 +47,8 @@ def _shapes(content: str, size: shapes.Size) -> Iterator[shapes.Shape]:
             yield shapes.Outline(label, flat)
 
 
-FORMATS: Final = (shapes.LabelFormat("YOLO segmentation", ".txt", _is_yolo, _read_yolo),)
+FORMATS: Final = (
+    shapes.LabelFormat(
+        "YOLO segmentation", ".txt", lambda _, text: bool(_LINE.search(text)), _read_yolo
+    ),
+)
