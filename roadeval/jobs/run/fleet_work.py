@@ -11,7 +11,7 @@ import secrets
 import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -192,8 +192,24 @@ def _check_software(asking: Mapping[str, str], config: RunConfig) -> None:
 def _try_replay(task: DriveTask) -> Made:
     """Replay a drive; whatever is wrong with it is in what is returned."""
     stamp, started = stamp_files(task.entry, task.config), time.perf_counter()
+    drive, folder, record = task.entry.id, task.folder, task.record
+    output = OutputSettings(
+        save=str(recording_path(folder, drive)) if record != "none" else None,
+        reports=str(results_path(folder, drive)),
+        record=record,
+        focus=task.focus,
+        figures=False,
+    )
+    alone = replace(task.config.run, jobs=1)
+    pictures = WorstPictures(task.focus)
     try:
-        _replay(task)
+        config = replace(task.config, output=output, run=alone, fleet=FleetSettings())
+        outcome = replay(task.entry.source, config, on_frame=pictures.offer)
+        _remove(task, PICTURES, *CACHED, *([RECORDINGS] if record == "none" else []))
+        for _, frame, _, picture in pictures.worst:
+            put(folder / PICTURES / drive / f"{frame}.jpg", picture)
+        if outcome.facts.frames.evaluated:
+            cache(folder, drive)
     except Exception as error:
         if _disk_failure(error):
             raise
@@ -204,26 +220,6 @@ def _try_replay(task: DriveTask) -> Made:
         return mark_failed(task, reason, 1 if is_known else 70)
     seconds = time.perf_counter() - started
     return Made(task.entry.id, task.asked, stamp, task.fold, task.model or None, seconds=seconds)
-
-
-def _replay(task: DriveTask) -> None:
-    drive, folder = task.entry.id, task.folder
-    output = OutputSettings(
-        save=str(recording_path(folder, drive)) if task.record != "none" else None,
-        reports=str(results_path(folder, drive)),
-        record=task.record,
-        focus=task.focus,
-        figures=False,
-    )
-    alone = replace(task.config.run, jobs=1)
-    config = replace(task.config, output=output, run=alone, fleet=FleetSettings())
-    pictures = WorstPictures(task.focus)
-    outcome = replay(task.entry.source, config, on_frame=pictures.offer)
-    _remove(task, PICTURES, *CACHED, *([RECORDINGS] if task.record == "none" else []))
-    for _, frame, _, picture in pictures.worst:
-        put(folder / PICTURES / drive / f"{frame}.jpg", picture)
-    if outcome.facts.frames.evaluated:
-        cache(folder, drive)
 
 
 def _remove(task: DriveTask, *folders: str) -> None:
@@ -320,23 +316,33 @@ def train_fold(task: FoldTask) -> FoldModel:
         parts = [settings_digest(task.config, ""), looks]
         parts += [[entry.id, settings_digest(config, "")] for entry, config in task.candidates]
         digest = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
-        return _find_trained(task, about, digest) or _train_model(task, about, digest)
-
-
-def _find_trained(task: FoldTask, about: Path, asked_digest: str) -> FoldModel | None:
-    try:
-        about_model = read_json(read_bounded(about))
-        digest = sha256_of(task.path)
-    except (OSError, ValueError):
-        return None
-    as_asked = {"asked": asked_digest, "sha256": digest}
-    if not isinstance(about_model, dict) or not as_asked.items() <= about_model.items():
-        return None
-    return FoldModel(task.fold, digest)
+        with suppress(OSError, ValueError):
+            trained = read_json(read_bounded(about))
+            as_asked = {"asked": digest, "sha256": sha256_of(task.path)}
+            if isinstance(trained, dict) and as_asked.items() <= trained.items():
+                return FoldModel(task.fold, as_asked["sha256"])
+        return _train_model(task, about, digest)
 
 
 def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
-    drawn, passed = _draw_frames(task)
+    """Train on as many drives as are wanted; why others gave no frames stands beside the model."""
+    held = HeldFrames()
+    drawn: dict[Path, Sequence[Frame]] = {}
+    passed: dict[str, str] = {}
+    for entry, config in task.candidates:
+        if len(drawn) == TRAINING_DRIVES:
+            break
+        try:
+            frames, _ = draw(entry, config, held, labelled=True)
+        except RoadevalError as error:
+            if _disk_failure(error):
+                raise
+            passed[entry.id] = " ".join(str(error).split())
+            continue
+        if frames:
+            drawn[Path(entry.id)] = frames
+        else:
+            passed[entry.id] = "no frame with truth"
     if not drawn:
         why = f": {min(passed.values())}" if passed else ""
         others = f"none of the {len(task.candidates)} drives of the other folds"
@@ -358,28 +364,6 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
     }
     put(about, json_text(about_model).encode())
     return FoldModel(task.fold, digest)
-
-
-def _draw_frames(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]:
-    """Return the training frames of as many drives as are wanted, and why others gave none."""
-    held = HeldFrames()
-    drawn: dict[Path, Sequence[Frame]] = {}
-    passed: dict[str, str] = {}
-    for entry, config in task.candidates:
-        if len(drawn) == TRAINING_DRIVES:
-            break
-        try:
-            frames, _ = draw(entry, config, held, labelled=True)
-        except RoadevalError as error:
-            if _disk_failure(error):
-                raise
-            passed[entry.id] = " ".join(str(error).split())
-            continue
-        if frames:
-            drawn[Path(entry.id)] = frames
-        else:
-            passed[entry.id] = "no frame with truth"
-    return drawn, passed
 
 
 WIDTH: Final = 320

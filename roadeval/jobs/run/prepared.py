@@ -409,19 +409,15 @@ def process(
             if len(run.failures.first or ()) == HOPELESS:
                 break
     for run in runs:
-        if first := run.failures.first:
-            raise _hopeless_error(run, first) from StageError(first[0].traceback)
-
-
-def _hopeless_error(run: Run, failures: Sequence[Failure]) -> StageError:
-    """Return the error that ends a run in which the first frames failed, or all."""
-    first, last = failures[0], failures[-1]
-    names = [layout.name for layout in run.layouts if layout.name != first.variant]
-    others = Sentence(" ").join(Sentence("{only} {}", name) for name in names)
-    remedy = Sentence("mend it, or leave the variant out with {}", others) if names else "mend it"
-    frames = f"the first {len(failures)} frames ({first.frame} to {last.frame})"
-    problem = Sentence("{}, on each of {}", first.reason, frames)
-    return StageError(problem, where=f"variant {first.variant}", remedy=remedy)
+        if failures := run.failures.first:
+            first, last = failures[0], failures[-1]
+            names = [layout.name for layout in run.layouts if layout.name != first.variant]
+            others = Sentence(" ").join(Sentence("{only} {}", name) for name in names)
+            leave_out = Sentence("mend it, or leave the variant out with {}", others)
+            frames = f"the first {len(failures)} frames ({first.frame} to {last.frame})"
+            problem = Sentence("{}, on each of {}", first.reason, frames)
+            where, remedy = f"variant {first.variant}", leave_out if names else "mend it"
+            raise StageError(problem, where=where, remedy=remedy) from StageError(first.traceback)
 
 
 def _process(

@@ -268,23 +268,56 @@ def versions() -> dict[str, str]:
 
 def warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield what a user should know before believing the results."""
-    if missing := run.selection.no_truth:
-        no_truth = "there is no road truth to score against, only masks to look at: {}"
-        yield Sentence(no_truth, missing)
-        yield from _ranking_warnings(run)
-    yield from _label_warnings(run)
+    yield from _truth_warnings(run)
     yield from (str(damage) for damage in run.log.damage if not damage.lossy)
     yield from (Sentence("{}: {}", run.selection.image.name, n) for n in run.selection.notes)
     yield from run.frames.accounting.notes
     yield from _size_warnings(run)
-    yield from _network_warnings(run)
-    yield from _tuning_warnings(run)
+    yield from _method_warnings(run)
     yield from _mask_warnings(run, totals)
-    yield from _disturbance_warnings(run) if run.config.frames.disturb else ()
-    yield from _training_warnings(run)
+    roles, settings = Counter(run.board.roles()), run.config.training
+    is_given = settings.model is not None and not settings.adapt
+    if is_given and roles[Role.TRAINING] and roles[Role.EVALUATED]:
+        yield (
+            f"{roles[Role.TRAINING]} of the model's {len(run.model.digests)} training frames lie "
+            f"in this drive; their neighbours are evaluated and {FLATTERED}"
+        )
     yield from _pick_warnings(run)
-    yield from _constant_warnings(totals)
+    for variant, stages in totals.items():
+        *_, total = stages.values()
+        for share, where in ((0, "nowhere"), (1, "everywhere")):
+            if variant != BASELINE and total["pooled_TPR"] == total["pooled_FPR"] == share:
+                yield f"{variant}: its final mask is road {where}, on every frame"
     yield from run.model.warnings
+
+
+def _truth_warnings(run: Run) -> Iterator[str]:
+    """Yield what follows from a log with little truth, or none, for the frames that are shown."""
+    if missing := run.selection.no_truth:
+        no_truth = "there is no road truth to score against, only masks to look at: {}"
+        yield Sentence(no_truth, missing)
+        rule, doubts = run.config.output.record, run.board.unlabelled
+        unlabelled = describe_doubts(doubts.rows(), doubts.differing())
+        if rule.startswith("worst:") and unlabelled:
+            pictures = (
+                "kept the frames that are most in doubt, by "
+                f"{unlabelled.sign} of {unlabelled.variant}"
+            )
+            if unlabelled.sign not in RANKS_AT_ONCE:
+                alone = "one method alone says nothing by which a frame could rank"
+                pictures = f"kept no pictures: {alone}"
+            yield Sentence("without truth {output.record} {} {}", rule, pictures)
+    if run.config.frames.labelled:
+        yield (
+            "only frames with truth were read: windows are of frames that follow each other among "
+            "these, and flicker is what changes from one to the next, however far apart they are"
+        )
+    if run.selection.truth is not None and not run.frames.accounting.labelled:
+        stride = run.config.frames.every
+        why = Sentence(": {frames.every} {} leaves out each one that has", stride)
+        problem = "none of the frames that were read has road truth"
+        remedy = Sentence("{frames.labelled} reads only frames that have")
+        yield Sentence("{}{}; {}", problem, why if stride > 1 else "", remedy)
 
 
 def _size_warnings(run: Run) -> Iterator[str]:
@@ -305,19 +338,6 @@ def _size_warnings(run: Run) -> Iterator[str]:
             )
     if selection.ground and (lens := selection.calibration) and selection.calibration_why:
         yield Sentence("metres rest on {}: {}", lens.topic, selection.calibration_why)
-
-
-def _ranking_warnings(run: Run) -> Iterator[str]:
-    """Yield by what ``worst:K`` ranked the frames of a log without truth."""
-    rule, doubts = run.config.output.record, run.board.unlabelled
-    unlabelled = describe_doubts(doubts.rows(), doubts.differing())
-    if rule.startswith("worst:") and unlabelled:
-        pictures = (
-            f"kept the frames that are most in doubt, by {unlabelled.sign} of {unlabelled.variant}"
-        )
-        if unlabelled.sign not in RANKS_AT_ONCE:
-            pictures = "kept no pictures: one method alone says nothing by which a frame could rank"
-        yield Sentence("without truth {output.record} {} {}", rule, pictures)
 
 
 def _pick_warnings(run: Run) -> Iterator[str]:
@@ -348,17 +368,13 @@ def _pick_warnings(run: Run) -> Iterator[str]:
         yield f"{others} labels are of frames that were not picked: they are in no number"
 
 
-def _network_warnings(run: Run) -> Iterator[str]:
-    """Yield which networks' outputs are taken for probabilities."""
+def _method_warnings(run: Run) -> Iterator[str]:
+    """Yield whose outputs are taken for probabilities, and where tuned methods have learnt."""
     for name, stages in run.methods.items():
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
         if probable and not name.endswith(TUNED):
             taken = "the network's output is taken for probabilities, for it stays within 0 and 1"
             yield Sentence("{}: {}; if it holds logits, set {net.activation}", name, taken)
-
-
-def _tuning_warnings(run: Run) -> Iterator[str]:
-    """Yield for each method that was tuned where its trees have learnt."""
     settings, roles = run.config.training, Counter(run.board.roles())
     number = roles[Role.TRAINING]
     frames = "labelled frames" if run.model.source == "truth" else "frames, without labels"
@@ -380,23 +396,8 @@ def _tuning_warnings(run: Run) -> Iterator[str]:
             )
 
 
-def _label_warnings(run: Run) -> Iterator[str]:
-    """Yield what windows are of where only labelled frames are read, and whether none was."""
-    if run.config.frames.labelled:
-        yield (
-            "only frames with truth were read: windows are of frames that follow each other among "
-            "these, and flicker is what changes from one to the next, however far apart they are"
-        )
-    if run.selection.truth is not None and not run.frames.accounting.labelled:
-        stride = run.config.frames.every
-        why = Sentence(": {frames.every} {} leaves out each one that has", stride)
-        problem = "none of the frames that were read has road truth"
-        remedy = Sentence("{frames.labelled} reads only frames that have")
-        yield Sentence("{}{}; {}", problem, why if stride > 1 else "", remedy)
-
-
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
-    """Yield a warning where masks of other systems are missing, or belong to no frame."""
+    """Yield which masks of other systems are missing, belong to no frame, or are not disturbed."""
     seen = run.frames.accounting
     for name, masks in run.selection.labels.items():
         if name in run.selection.masks and (missing := seen.read - seen.masks[name]):
@@ -414,14 +415,10 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
         notes = (*masks.notes, *masks.meaning.notes)
         yield from (Sentence("{}: {}: {}", shown, where, note) for note in notes)
     yield from run.frames.unpaired()
-
-
-def _disturbance_warnings(run: Run) -> Iterator[str]:
-    """Yield what could not be disturbed."""
     names = [v.name for v in run.layouts if v.name not in run.disturbed_variants]
-    if not run.selection.truth:
+    if run.config.frames.disturb and not run.selection.truth:
         yield Sentence("{frames.disturb}: nothing is disturbed without truth to score against")
-    elif names:
+    elif run.config.frames.disturb and names:
         why = "whose masks were made of the images as they are"
         yield Sentence("{frames.disturb}: not for {}, {}", listing(names), why)
 
@@ -440,27 +437,6 @@ def _mask_facts(run: Run) -> dict[str, Any]:
             "frames": seen.masks[name] if name in run.selection.masks else seen.labelled,
         }
     return masks
-
-
-def _training_warnings(run: Run) -> Iterator[str]:
-    """Warn where frames that trained a model file lie in this drive."""
-    roles, trained = Counter(run.board.roles()), len(run.model.digests)
-    of_this_drive, settings = roles[Role.TRAINING], run.config.training
-    is_given = settings.model is not None and not settings.adapt
-    if is_given and of_this_drive and roles[Role.EVALUATED]:
-        yield (
-            f"{of_this_drive} of the model's {trained} training frames lie in this drive; their "
-            f"neighbours are evaluated and {FLATTERED}"
-        )
-
-
-def _constant_warnings(totals: Totals) -> Iterator[str]:
-    """Warn of variants whose final mask is road nowhere, or everywhere."""
-    for variant, stages in totals.items():
-        *_, total = stages.values()
-        for share, where in ((0, "nowhere"), (1, "everywhere")):
-            if variant != BASELINE and total["pooled_TPR"] == total["pooled_FPR"] == share:
-                yield f"{variant}: its final mask is road {where}, on every frame"
 
 
 def _account_for_frames(run: Run) -> FrameAccount:
