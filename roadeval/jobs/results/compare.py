@@ -35,8 +35,6 @@ from roadeval.runtime.text import visible
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.report.blocks import Report
-
 
 SILENT_S: Final = 1.0
 """Seconds of a comparison after which its progress is told."""
@@ -97,7 +95,7 @@ def compare(
         sides = variants_as_sides(opened_side, opened[0].variants, variants)
         opened *= len(sides)
     else:
-        sides = _choose_sides(opened, _name_results(paths), variants)
+        sides = _choose_sides(opened, paths, variants)
     settings = opened[0].facts.evaluation
     drives, total = list[tuple[str, str]](), sum(len(side.scored) for side in sides)
     begun = time.monotonic()
@@ -141,9 +139,17 @@ def _failure_sentence(result: Result) -> str:
 
 
 def _choose_sides(
-    opened: Sequence[Result], labels: Sequence[str], variants: Sequence[str] | None
+    opened: Sequence[Result], paths: Sequence[Path], variants: Sequence[str] | None
 ) -> list[Side]:
-    """Return several results, each with those of its variants that are compared."""
+    """Return several results, each with those of its variants that are compared.
+
+    A result is named by its file, or by its whole path where another has the same name.
+    """
+    stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
+    labels: list[str] = []
+    for stem, path in zip(stems, paths, strict=True):
+        label = stem if stems.count(stem) == 1 else visible(str(path))
+        labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
     pairs = [name.partition("=")[::2] for name in variants or ()]
     of_base = {base_name: other or base_name for base_name, other in pairs}
     of_others = {name: name for name in of_base.values()}
@@ -159,16 +165,6 @@ def _choose_sides(
     return sides
 
 
-def _name_results(paths: Sequence[Path]) -> list[str]:
-    """Name each result by its file, or by its whole path where another has the same name."""
-    stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
-    labels: list[str] = []
-    for stem, path in zip(stems, paths, strict=True):
-        label = stem if stems.count(stem) == 1 else visible(str(path))
-        labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
-    return labels
-
-
 def write(compared: Compared, path: Path, kind: str = "", command: str = "") -> Path:
     """Write a comparison as PDF, page, Markdown, badge or JSON, by the file's ending.
 
@@ -182,21 +178,16 @@ def write(compared: Compared, path: Path, kind: str = "", command: str = "") -> 
         return write_file(path, comment(*about, over_drive(compared), command).encode())
     if path.suffix.lower() == ".svg":
         return write_file(path, badge(*about).encode())
-    return write_document(
-        *(path, "a comparison", lambda: _document(compared)),
-        lambda: markdown(*about),
-        lambda: as_json(compared),
-    )
 
-
-def _document(compared: Compared) -> Report:
-    def command(result: str, frame: int) -> str:
+    def inspect(result: str, frame: int) -> str:
         drive = compared.recordings.get(result)
         return drive.inspect(frame) if drive else ""
 
-    return document(
-        *(compared.comparison, compared.judgements, over_drive(compared)),
-        command if compared.recordings else None,
+    inspected = inspect if compared.recordings else None
+    return write_document(
+        *(path, "a comparison", lambda: document(*about, over_drive(compared), inspected)),
+        lambda: markdown(*about),
+        lambda: as_json(compared),
     )
 
 

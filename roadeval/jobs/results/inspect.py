@@ -63,7 +63,17 @@ def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
     if fleet := result.fleet:
         if fleet.worst.empty:
             raise _nothing_scored(fleet.path)
-        return [_of_fleet(fleet, row) for row in records(fleet.worst[:count])]
+        names = ("rank", "drive", "frame", "stamp_ns", "variant", "stage")
+        return [
+            WorstFrame(
+                **{name: row[name] for name in names},
+                rates={name: row[name] for name in (TESTED, "FPR", "FNR")},
+                picture=str(fleet.path / row["picture"]) if row["picture"] else None,
+                recording=path if path.exists() else None,
+            )
+            for row in records(fleet.worst[:count])
+            for path in [recording_path(fleet.path, row["drive"])]
+        ]
     cameras = result.rig or [drive for drive in [result.drive] if drive]
     frames = [frame for camera in cameras for frame in rank_frames(camera, count or LISTED)]
     frames = sorted(frames, key=lambda frame: -(frame.rates[frame.by] or 0.0))[: count or LISTED]
@@ -76,17 +86,6 @@ def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
             f"{path}: ERR of {focus} is undefined on every frame, so no frame is the worst"
         )
     return frames
-
-
-def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
-    names = ("rank", "drive", "frame", "stamp_ns", "variant", "stage")
-    recording = recording_path(fleet.path, row["drive"])
-    return WorstFrame(
-        **{name: row[name] for name in names},
-        rates={name: row[name] for name in (TESTED, "FPR", "FNR")},
-        picture=str(fleet.path / row["picture"]) if row["picture"] else None,
-        recording=recording if recording.exists() else None,
-    )
 
 
 def rank_frames(

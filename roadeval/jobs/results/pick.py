@@ -189,7 +189,7 @@ def _pick_frames(
         choice = f"{likely(name, names)}there are {', '.join(names)}"
         raise RoadevalError(f"no variant {name}", where=source, remedy=choice)
     doubts = only(rows, variant=name)
-    picks_before = _read_picks(drive, folder) or _empty_picks(drive, doubts, name, source, seed)
+    picks_before = _begin_picks(drive, folder, doubts, source, seed)
     scores = picks_before.every_score()
     if (sign := sign_of(doubts)) is not None:  # how much they are in doubt by now
         now = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
@@ -215,22 +215,44 @@ def _pick_frames(
     return picks, [(frame, masks[frame.frame]) for frame in new]
 
 
-def _read_picks(drive: DriveResult, folder: Path) -> Picks | None:
-    """Return the picks that a folder holds; None if there are none yet."""
-    facts, picks = drive.facts, Picks.read(folder)
-    if picks is None:
-        # Files that a killed run has left are written again.
-        left = {*folder.rglob("*")} if folder.exists() else set()
-        begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
-        begun |= {file for file in left if re.fullmatch(r"\d{19}\.png", file.name)}
-        proposed = {file for file in left if folder / PROPOSALS in file.parents}
-        labels = {file for file in left if folder / LABELS in file.parents}
-        if labels or left - begun - proposed:
-            raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
-        return None
-    if (picks.log, picks.camera) != (facts.log_digest, facts.drive.camera):
-        raise RoadevalError(f"{folder}: its frames are of another log; name a folder of its own")
-    return picks
+def _begin_picks(
+    drive: DriveResult, folder: Path, rows: pd.DataFrame, source: Path, seed: int
+) -> Picks:
+    """Return the picks that a folder holds; if there are none yet, picks without a frame.
+
+    These have the frames of a result that can be picked, and their doubt: ``rows`` of one variant.
+    """
+    log, camera = drive.facts.log_digest, drive.facts.drive.camera
+    if (picks := Picks.read(folder)) is not None:
+        if (picks.log, picks.camera) != (log, camera):
+            problem = "its frames are of another log; name a folder of its own"
+            raise RoadevalError(f"{folder}: {problem}")
+        return picks
+    # Files that a killed run has left are written again.
+    left = {*folder.rglob("*")} if folder.exists() else set()
+    begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
+    begun |= {file for file in left if re.fullmatch(r"\d{19}\.png", file.name)}
+    proposed = {file for file in left if folder / PROPOSALS in file.parents}
+    labels = {file for file in left if folder / LABELS in file.parents}
+    if labels or left - begun - proposed:
+        raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
+    stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
+    if len({*stamps}) < len(stamps):
+        raise RoadevalError(f"{source}: several frames have one stamp, so no label finds its own")
+    doubts = rows[sign].tolist() if sign else [np.nan] * len(rows)
+    (variant,), identity = values_of(rows, "variant"), drive.properties.get("input")
+    return Picks(
+        drive=drive.name,
+        camera=camera,
+        log=log,
+        method={"variant": variant, "ranked_by": sign, "identity": identity},
+        seed=seed,
+        drawn=0,
+        frames=rows["frame"].tolist(),
+        stamps=stamps,
+        scores=[doubt if np.isfinite(doubt) else None for doubt in doubts],
+        picked=[],
+    )
 
 
 def _write_picks(
@@ -264,29 +286,6 @@ def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, byte
     if labels != PNG:
         return as_coco(proposals)
     return {proposal.image: png_of(proposal.levels) for proposal in proposals}
-
-
-def _empty_picks(
-    drive: DriveResult, rows: pd.DataFrame, variant: str, source: Path, seed: int
-) -> Picks:
-    """Return picks without a frame: those of a result that can be picked, and their doubt."""
-    stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
-    if len({*stamps}) < len(stamps):
-        raise RoadevalError(f"{source}: several frames have one stamp, so no label finds its own")
-    doubts = rows[sign].tolist() if sign else [np.nan] * len(rows)
-    method = {"variant": variant, "ranked_by": sign, "identity": drive.properties.get("input")}
-    return Picks(
-        drive=drive.name,
-        camera=drive.facts.drive.camera,
-        log=drive.facts.log_digest,
-        method=method,
-        seed=seed,
-        drawn=0,
-        frames=rows["frame"].tolist(),
-        stamps=stamps,
-        scores=[doubt if np.isfinite(doubt) else None for doubt in doubts],
-        picked=[],
-    )
 
 
 def _add_picks(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import cached_property
 from itertools import chain
@@ -283,20 +283,6 @@ class DriveResult:
 Opened = DriveResult | FleetFolder
 
 
-def _open(path: Path, focus: str | None) -> list[Opened]:
-    """Open a result; of a replay of several cameras that of each."""
-    if is_fleet(path):
-        return [FleetFolder(path, focus)]
-    try:
-        drive = DriveResult(path, focus=focus)
-    except SeveralCamerasError as error:
-        return [DriveResult(path, name, focus) for name in error.cameras]
-    except RoadevalError as error:
-        raise error.of(error, FETCHED.get(path, "")) from error
-    cameras = drive.facts.cameras if drive.recording is None else ()
-    return [DriveResult(path, name, focus) for name in cameras] or [drive]
-
-
 class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 
@@ -325,7 +311,20 @@ class Result:
     def __init__(self, *paths: str | Path, focus: str | None = None) -> None:
         self.paths = tuple(map(local_path, paths))
         self._chosen: Final = focus
-        self._opened: list[Opened] = [r for path in self.paths for r in _open(path, focus)]
+        self._opened: list[Opened] = []
+        for path in self.paths:
+            if is_fleet(path):
+                self._opened.append(FleetFolder(path, focus))
+                continue
+            try:
+                drive = DriveResult(path, focus=focus)
+            except SeveralCamerasError as error:
+                self._opened += [DriveResult(path, name, focus) for name in error.cameras]
+                continue
+            except RoadevalError as error:
+                raise error.of(error, FETCHED.get(path, "")) from error
+            cameras = drive.facts.cameras if drive.recording is None else ()
+            self._opened += [DriveResult(path, name, focus) for name in cameras] or [drive]
         if focus:
             scored = [[*result.facts.finals] for result in self._opened]
             doubts = [values_of(drive.table("unlabelled"), "variant") for drive in self._drives]
@@ -411,7 +410,35 @@ class Result:
     @cached_property
     def compared(self) -> tuple[ComparedDrive, ...]:
         """The drives, as a comparison knows them."""
-        return tuple(chain.from_iterable(map(_compared_drives, self._opened)))
+        drives = list[ComparedDrive]()
+        for result in self._opened:
+            settings = number_settings(result.facts.run)
+            if isinstance(result, DriveResult):
+                facts, frames = result.facts, result.rows["frame"].nunique()
+                settings |= input_digests(facts)
+                key, digest = result.key, facts.log_digest
+                drives.append(ComparedDrive(*key, result.title, digest, frames, settings))
+                continue
+            rows = records(result.drives)
+            scored = next((row["drive"] for row in rows if row["evaluated"]), None)
+            if scored is not None:
+                with suppress(RoadevalError):  # the folders of its drives may be gone
+                    files = input_digests(ResultsFolder(results_path(result.path, scored)).facts)
+                    # Masks and truth of one drive say nothing of the others'.
+                    settings |= {k: value for k, value in files.items() if k.startswith(OF_ALL)}
+            drives += (
+                ComparedDrive(
+                    drive=row["drive"],
+                    camera=row["camera"] or "",
+                    name=result.names[row["drive"]],
+                    digest=row["log_digest"] or None,
+                    frames=row["evaluated"] or 0,
+                    settings=settings,
+                    group=row["group"],
+                )
+                for row in rows
+            )
+        return tuple(drives)
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -459,32 +486,6 @@ class Result:
             elif drives is None or result.key in drives:
                 parts.append(result.table(name))
         return concatenate(parts)
-
-
-def _compared_drives(result: Opened) -> Iterator[ComparedDrive]:
-    settings = number_settings(result.facts.run)
-    if isinstance(result, DriveResult):
-        facts, frames = result.facts, result.rows["frame"].nunique()
-        settings |= input_digests(facts)
-        yield ComparedDrive(*result.key, result.title, facts.log_digest, frames, settings)
-        return
-    fleet, drives = result, records(result.drives)
-    scored = next((row["drive"] for row in drives if row["evaluated"]), None)
-    if scored is not None:
-        with suppress(RoadevalError):  # the folders of its drives may be gone
-            files = input_digests(ResultsFolder(results_path(fleet.path, scored)).facts)
-            # Masks and truth of one drive say nothing of the others'.
-            settings |= {name: value for name, value in files.items() if name.startswith(OF_ALL)}
-    for row in drives:
-        yield ComparedDrive(
-            drive=row["drive"],
-            camera=row["camera"] or "",
-            name=fleet.names[row["drive"]],
-            digest=row["log_digest"] or None,
-            frames=row["evaluated"] or 0,
-            settings=settings,
-            group=row["group"],
-        )
 
 
 def number_settings(run: Mapping[str, Any]) -> dict[str, Any]:
