@@ -25,8 +25,21 @@ def read_camera(path: str | Path, topic: str | None = None) -> dict[str, Any]:
         reason = getattr(error, "strerror", None) or error
         raise ConfigError(f"cannot be read as YAML: {reason}", where=path) from error
     try:
-        is_ros = "camera_matrix" in document
-        lens = _read_ros(document) if is_ros else _read_kalibr(path, document, f"{topic}/")
+        if "camera_matrix" in document:
+            matrix = document["camera_matrix"]["data"]
+            size = document["image_width"], document["image_height"]
+            # Files of old versions do not name the model; ROS assumes this one.
+            model = document.get("distortion_model") or "plumb_bob"
+            distortion = document["distortion_coefficients"]["data"]
+            lens = matrix[0], matrix[4], matrix[2], matrix[5]
+        else:
+            camera = _choose_camera(path, document, f"{topic}/")
+            size, lens = camera["resolution"], camera["intrinsics"]
+            model, distortion = camera["distortion_model"], camera["distortion_coeffs"]
+        # PyYAML reads 1e-05, which has no point, as text.
+        fx, fy, *centre = map(float, lens)
+        numbers = {"focal": [fx, fy], "centre": centre, "distortion": [*map(float, distortion)]}
+        settings = {"size": [*size], "model": model, **numbers}
         mounted = {name: document[name] for name in ("height", "pitch", "roll") if name in document}
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ConfigError(
@@ -34,19 +47,11 @@ def read_camera(path: str | Path, topic: str | None = None) -> dict[str, Any]:
             where=path,
             remedy="give its height, pitch and lens in a TOML file",
         ) from error
-    return {**lens, **mounted}
+    return {**settings, **mounted}
 
 
-def _read_ros(document: Mapping[str, Any]) -> dict[str, Any]:
-    matrix = document["camera_matrix"]["data"]
-    size = document["image_width"], document["image_height"]
-    # Files of old versions do not name the model; ROS assumes this one.
-    model = document.get("distortion_model") or "plumb_bob"
-    distortion = document["distortion_coefficients"]["data"]
-    return _settings(size, (matrix[0], matrix[4], matrix[2], matrix[5]), model, distortion)
-
-
-def _read_kalibr(path: str | Path, document: Mapping[str, Any], topic: str) -> dict[str, Any]:
+def _choose_camera(path: str | Path, document: Mapping[str, Any], topic: str) -> Mapping[str, Any]:
+    """Return the pinhole camera of Kalibr's file that has a topic, or the only one."""
     chain = {name: camera for name, camera in document.items() if "cam" in name}
     topics = {name: str(camera.get("rostopic", "")) for name, camera in chain.items()}
     names = [name for name, own in topics.items() if own and topic.startswith(f"{own}/")]
@@ -55,16 +60,8 @@ def _read_kalibr(path: str | Path, document: Mapping[str, Any], topic: str) -> d
         cameras = ", ".join(f"{name} ({own})" for name, own in topics.items())
         choose = Sentence("choose one with {topics.image}")
         raise ConfigError(f"several cameras, {cameras}", where=path, remedy=choose)
-    camera = chain[name]
+    camera: Mapping[str, Any] = chain[name]
     if camera["camera_model"] != "pinhole":
         problem = f"{name} is of the model {camera['camera_model']}, no pinhole"
         raise ConfigError(problem, where=path)
-    model, distortion = camera["distortion_model"], camera["distortion_coeffs"]
-    return _settings(camera["resolution"], camera["intrinsics"], model, distortion)
-
-
-def _settings(size: Any, lens: Any, model: Any, distortion: Any) -> dict[str, Any]:
-    # PyYAML reads 1e-05, which has no point, as text.
-    fx, fy, *centre = map(float, lens)
-    numbers = {"focal": [fx, fy], "centre": centre, "distortion": [*map(float, distortion)]}
-    return {"size": [*size], "model": model, **numbers}
+    return camera

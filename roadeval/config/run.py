@@ -235,9 +235,16 @@ class RunConfig(LogConfig):
             masks=with_masks(self.masks, tables.get("masks", {})),
             **{t: override(getattr(self, t), tables.get(t, {}), t) for t in SECTIONS},
         )
-        if "cameras" in tables:
-            config = replace(config, cameras=_read_cameras(tables["cameras"]))
-        return config
+        if "cameras" not in tables:
+            return config
+        rig = tables["cameras"]
+        if not isinstance(rig, list | tuple) or not all(isinstance(t, Mapping) for t in rig):
+            raise ConfigError("cameras must be tables, each under [[cameras]]")
+        for table in rig:
+            if not table.get("image"):
+                raise ConfigError(f"[[cameras]] {table.get('name', '')}: image must name its topic")
+        cameras = (override(CameraSettings(table["image"]), table, "cameras") for table in rig)
+        return replace(config, cameras=tuple(cameras))
 
     def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
         """Return the configuration with further variants, each in place of one of the same name.
@@ -336,16 +343,6 @@ class RunConfig(LogConfig):
                 raise ConfigError(f"[variants.{name}] must be a table")
             variants.append(Variant.of(name, table, f"[variants.{name}]"))
         return self.with_variants(variants).extra
-
-
-def _read_cameras(tables: Any) -> tuple[CameraSettings, ...]:
-    """Return the settings of ``[[cameras]]``; a `ConfigError` if one cannot be used."""
-    if not isinstance(tables, list | tuple) or not all(isinstance(t, Mapping) for t in tables):
-        raise ConfigError("cameras must be tables, each under [[cameras]]")
-    for table in tables:
-        if not table.get("image"):
-            raise ConfigError(f"[[cameras]] {table.get('name', '')}: image must name its topic")
-    return tuple(override(CameraSettings(table["image"]), table, "cameras") for table in tables)
 
 
 def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> RunConfig:

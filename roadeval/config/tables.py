@@ -64,13 +64,24 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     A `ConfigError` if they cannot be read, or name code that may not be loaded; see
     `roadeval.config.run.load_config`.
     """
+    file = Path(path)
     try:
-        tables = read_toml(_text(Path(path)))
+        check_input(file)
+        if file.suffix == ".rrd":
+            from roadeval.recording.recording import run_toml_in
+
+            text = run_toml_in(file)
+        else:
+            text = file.read_text(encoding="utf-8-sig")  # some editors begin a file with this mark
+        if text is None:
+            problem = "has no configuration because the run was interrupted"
+            raise ConfigError(problem, where=file, remedy="replay the drive once more")
+        tables = read_toml(text)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ConfigError(f"{path}: cannot be read as TOML: {error}") from error
-    if not trusted or Path(path).suffix == ".rrd":
+    if not trusted or file.suffix == ".rrd":
         _refuse_code(tables, path)
     return tables
 
@@ -90,19 +101,6 @@ def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
                 )
 
 
-def _text(path: Path) -> str:
-    check_input(path)
-    if path.suffix != ".rrd":
-        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with this mark
-    from roadeval.recording.recording import run_toml_in
-
-    text = run_toml_in(path)
-    if text is None:
-        problem = "has no configuration because the run was interrupted"
-        raise ConfigError(problem, where=path, remedy="replay the drive once more")
-    return text
-
-
 def override(settings: Any, values: Any, table: str) -> Any:
     """Return a settings dataclass with the values of its table in place.
 
@@ -119,7 +117,16 @@ def override(settings: Any, values: Any, table: str) -> Any:
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:
-        raise _error_of(table, error.errors(include_url=False)[0]) from error
+        problem = error.errors(include_url=False)[0]
+        keys, cause = problem["loc"], problem.get("ctx", {}).get("error")
+        # The number of an item is followed by the type that pydantic tried for it.
+        names = [*map(str, takewhile(lambda part: isinstance(part, str), keys))]
+        setting = ".".join((table, *names))
+        if isinstance(cause, SettingError) and cause.setting:
+            inner = cause.rename_settings(lambda name: f"{setting}.{name}")
+            raise ConfigError.of(inner) from error
+        item = f"item {int(keys[len(names)]) + 1} " if len(names) < len(keys) else ""
+        raise ConfigError(f"{item}{describe_problem(problem)}", setting=setting) from error
 
 
 @cache
@@ -141,18 +148,6 @@ def quote(value: Any) -> str:
     """
     text = dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
-
-
-def _error_of(table: str, problem: Mapping[str, Any]) -> ConfigError:
-    """Return the error for a problem that pydantic has found in a table."""
-    keys, cause = problem["loc"], problem.get("ctx", {}).get("error")
-    # The number of an item is followed by the type that pydantic tried for it.
-    names = list(takewhile(lambda part: isinstance(part, str), keys))
-    setting = ".".join((table, *names))
-    if isinstance(cause, SettingError) and cause.setting:
-        return ConfigError.of(cause.rename_settings(lambda name: f"{setting}.{name}"))
-    item = f"item {int(keys[len(names)]) + 1} " if len(names) < len(keys) else ""
-    return ConfigError(f"{item}{describe_problem(problem)}", setting=setting)
 
 
 def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:

@@ -190,9 +190,12 @@ class Survey:
         for number, line in enumerate(lines):
             with_truth, borders = labelled[number], line.borders
             if number % places == places - 1:
-                end, start, cap = _ahead(road[number], with_truth, borders)
-                found_ends[:, number, 0, 1] = end
-                nothing = borders[start] if with_truth else math.nan
+                start, nothing, cap = 0, math.nan, math.nan
+                if with_truth:
+                    start, stop = _join_runs(with_truth, borders, GAP_AHEAD)[0]
+                    nothing, cap = borders[start], borders[stop]
+                    end = _free(road[number], start, cap, borders, math.nan)
+                    found_ends[:, number, 0, 1] = end
                 for place, runs in enumerate(mask_runs):
                     free = _free(runs[number], start, cap, borders, nothing)
                     found_ends[place, number, 0, 0] = free
@@ -275,17 +278,6 @@ def _sides(
         borders[stop] if any(first <= stop < end for first, end in labelled) else math.nan,
         (borders[start] + borders[stop]) / 2,
     )
-
-
-def _ahead(road: Runs, labelled: Runs, borders: list[float]) -> tuple[float, int, float]:
-    """Return where the truth's road ahead ends, its first pixel, and where the labels end.
-
-    The ends are in metres; the road's is NaN if the first labelled pixel is no road.
-    """
-    if not labelled:
-        return math.nan, 0, math.nan
-    start, stop = _join_runs(labelled, borders, GAP_AHEAD)[0]
-    return _free(road, start, borders[stop], borders, math.nan), start, borders[stop]
 
 
 def _free(runs: Runs, start: int, cap: float, borders: list[float], nothing: float) -> float:

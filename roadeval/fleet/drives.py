@@ -243,16 +243,6 @@ def groups_of(entries: Sequence[DriveEntry]) -> dict[str, str]:
     Logs with the same bytes are in one group, together with all other drives of their groups. Logs
     behind URLs are not compared.
     """
-    groups = {entry.id: entry.group or entry.id for entry in entries}
-    for copies in _find_copies(entries):
-        joined = {groups[entry.id] for entry in copies}
-        first = groups[copies[0].id]
-        groups = {drive: first if group in joined else group for drive, group in groups.items()}
-    return groups
-
-
-def _find_copies(entries: Sequence[DriveEntry]) -> list[list[DriveEntry]]:
-    """Return lists of drives with the same files; only files of equal size are read."""
     same_size = defaultdict[tuple[int, ...], list[tuple[DriveEntry, list[Path]]]](list)
     for entry in entries:
         # A drive that cannot be read is reported when it is replayed.
@@ -265,7 +255,12 @@ def _find_copies(entries: Sequence[DriveEntry]) -> list[list[DriveEntry]]:
         for entry, files in logs if len(logs) > 1 else ():
             with suppress(OSError):
                 same_bytes[tuple(map(sha256_of, files))].append(entry)
-    return [copies for copies in same_bytes.values() if len(copies) > 1]
+    groups = {entry.id: entry.group or entry.id for entry in entries}
+    for copies in (copies for copies in same_bytes.values() if len(copies) > 1):
+        joined = {groups[entry.id] for entry in copies}
+        first = groups[copies[0].id]
+        groups = {drive: first if group in joined else group for drive, group in groups.items()}
+    return groups
 
 
 def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
@@ -315,10 +310,19 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     manifest names two of its cameras. A `RoadevalError` if a word leads to no drive, a manifest
     cannot be used, or a drive has two descriptions.
     """
-    entries = _without_repeats(entry for word in words for entry in _drives_of(word))
-    if not entries:
+    first_of: dict[tuple[str, str], DriveEntry] = {}
+    bare: tuple[Any, ...] = (None, {}, {})
+    for entry in (entry for word in words for entry in _drives_of(word)):
+        place = entry.source if entry.path is None else os.path.realpath(entry.path)
+        first = first_of.setdefault((place, entry.camera), entry)
+        if first.description == bare != entry.description:
+            first_of[place, entry.camera] = entry
+        elif entry.description not in (first.description, bare):
+            problem = "is named twice, with different groups, tags or settings"
+            raise FleetError(problem, where=entry.shown)
+    if not first_of:
         raise FleetError("no drive found", remedy="name logs, folders of logs, URLs or a manifest")
-    return name_cameras(entries)
+    return name_cameras([*first_of.values()])
 
 
 def _drives_of(word: str) -> Iterator[DriveEntry]:
@@ -349,12 +353,27 @@ def _sources(word: str, base: Path) -> list[str]:
     elif path.exists():
         drives = [path]
     elif glob.has_magic(word):
-        drives = _find_matches(word, base)
+        names = glob.glob(word, root_dir=base, recursive=True)  # noqa: PTH207
+        paths = [base / name for name in names]
+        # ``*`` and ``**`` match only logs.
+        accepts = is_log if Path(word).name in ("*", "**") else is_usable
+        matches = {path for path in paths if not path.is_dir() and accepts(path.name)}
+        for folder in filter(Path.is_dir, paths):
+            matches.update(_find_below(folder))
+        if not matches:
+            raise FleetError("no log matches it", where=visible(word))
+        drives = sorted(matches, key=natural_path)
     else:
         raise FleetError("there is no such file or folder", where=where)
+    sources = []
     for drive in drives:
         _check_no_manifest(drive)
-    return [str(_absolute(drive)) for drive in drives]
+        # A link keeps its own name.
+        full = drive.resolve() if drive.name in ("", "..") else drive.parent.resolve() / drive.name
+        # Files of a rosbag2 folder would be several drives that share a day, a road and a camera.
+        is_in_bag = is_log(full.name) and is_bag(full.parent)
+        sources.append(str(full.parent if is_in_bag else full))
+    return sources
 
 
 def _check_no_manifest(path: Path) -> None:
@@ -381,41 +400,6 @@ def _find_below(folder: Path) -> list[Path]:
         folders[:] = sorted(filter(is_usable, folders))
         drives += [here] if is_bag(here) else [here / file for file in files if is_log(file)]
     return sorted(drives, key=lambda path: natural_path(path.relative_to(folder)))
-
-
-def _find_matches(word: str, base: Path) -> list[Path]:
-    """Return the drives that a glob matches; ``*`` and ``**`` match only logs."""
-    names = glob.glob(word, root_dir=base, recursive=True)  # noqa: PTH207
-    paths = [base / name for name in names]
-    accepts = is_log if Path(word).name in ("*", "**") else is_usable
-    drives = {path for path in paths if not path.is_dir() and accepts(path.name)}
-    for folder in filter(Path.is_dir, paths):
-        drives.update(_find_below(folder))
-    if not drives:
-        raise FleetError("no log matches it", where=visible(word))
-    return sorted(drives, key=natural_path)
-
-
-def _absolute(path: Path) -> Path:
-    """Return the absolute path of a drive; a link keeps its own name."""
-    full = path.resolve() if path.name in ("", "..") else path.parent.resolve() / path.name
-    # The files of a rosbag2 folder would be several drives that share a day, a road and a camera.
-    return full.parent if is_log(full.name) and is_bag(full.parent) else full
-
-
-def _without_repeats(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
-    """Return each drive once, with its description; a `FleetError` if it has two."""
-    first_of: dict[tuple[str, str], DriveEntry] = {}
-    bare: tuple[Any, ...] = (None, {}, {})
-    for entry in entries:
-        place = entry.source if entry.path is None else os.path.realpath(entry.path)
-        first = first_of.setdefault((place, entry.camera), entry)
-        if first.description == bare != entry.description:
-            first_of[place, entry.camera] = entry
-        elif entry.description not in (first.description, bare):
-            problem = "is named twice, with different groups, tags or settings"
-            raise FleetError(problem, where=entry.shown)
-    return list(first_of.values())
 
 
 def _check_tag(name: Any) -> Any:

@@ -228,7 +228,14 @@ def compare(
             old = replace(base, variants={base.label: new.label})
             matched, left = [(drive, drive) for drive in base.scored], []
         if not matched:
-            raise ComparisonError(_why_incomparable(old, new))
+            for side in (new, old):
+                if any(drive.digest is None for drive in side.scored):
+                    problem = f"{side.label} does not say which log it is of"
+                    raise ComparisonError(f"{problem}, so nothing can be compared")
+            raise ComparisonError(
+                f"{old.label} and {new.label} are of different drives, whose difference would mix "
+                "the scene with the method; compare results of the same drives"
+            )
         part = _compare_two(old, new, matched, settings, across_variants=across_variants)
         parts.append(replace(part, warnings=(*left, *part.warnings)))
     changes = [*chain(*(part.changes for part in parts))]
@@ -247,17 +254,6 @@ def compare(
         regions=tuple(replace(r, difference=d) for r, d in zip(regions, corrected, strict=True)),
         settings=settings,
         **{kind: tuple(chain(*(getattr(part, kind) for part in parts))) for kind in kinds},
-    )
-
-
-def _why_incomparable(base: Side, new: Side) -> str:
-    """Return why two results have no drive in common."""
-    for side in (new, base):
-        if any(drive.digest is None for drive in side.scored):
-            return f"{side.label} does not say which log it is of, so nothing can be compared"
-    return (
-        f"{base.label} and {new.label} are of different drives, whose difference would mix the "
-        "scene with the method; compare results of the same drives"
     )
 
 

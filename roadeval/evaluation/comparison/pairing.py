@@ -116,7 +116,12 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
             left[base.label, f"not in {new.label}"].append(drive.name)
             continue
         taken.add(other.key)
-        if reason := _why_incomparable(drive, other, new.label):
+        reasons = {
+            "not scored in both": not (drive.frames and other.frames),
+            "log unknown": None in (drive.digest, other.digest),
+            f"of another log in {new.label}": drive.digest != other.digest,
+        }
+        if reason := next((reason for reason, holds in reasons.items() if holds), None):
             left[base.label, reason].append(drive.name)
         else:
             pairs.append((drive, other))
@@ -124,14 +129,6 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
         if drive.key not in taken:
             left[new.label, f"not in {base.label}"].append(drive.name)
     return pairs, [left_out(names, *about) for about, names in left.items()]
-
-
-def _why_incomparable(base: ComparedDrive, new: ComparedDrive, label: str) -> str:
-    if not (base.frames and new.frames):
-        return "not scored in both"
-    if base.digest is None or new.digest is None:
-        return "log unknown"
-    return "" if base.digest == new.digest else f"of another log in {label}"
 
 
 def one_drive(sides: Sequence[Side]) -> list[Side] | None:

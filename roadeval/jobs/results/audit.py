@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -113,7 +113,12 @@ def audit(
         suspects["why"] = [describe_suspect(row) for row in records(suspects)]
         sentences = [*drive.facts.misfits, describe_suspects(suspects)]
         for name in annotators:
-            shares = [*_differing_shares(drive, frames, name)]
+            pairs = ((drive.truth(n), drive.final_masks(n).get(name)) for n in frames)
+            shares = [
+                float(((mask == 1) != truth)[truth != IGNORE].mean())
+                for truth, mask in pairs
+                if truth is not None and mask is not None and (truth != IGNORE).any()
+            ]
             if not shares:
                 raise RoadevalError(f"{path}: no masks of {name} on a frame with truth")
             sentences.append(describe_annotator(name, float(np.mean(shares)), len(shares)))
@@ -135,14 +140,6 @@ def _view(drive: DriveResult, frame: int) -> LabelledView:
     assert truth is not None
     stamp, masks = recording.stamps[frame], drive.final_masks(frame)
     return LabelledView.of(frame, stamp, recording.image(frame), truth, masks)
-
-
-def _differing_shares(drive: DriveResult, frames: Sequence[int], name: str) -> Iterator[float]:
-    """Yield on what share of a frame's labelled pixels a mask and the truth differ."""
-    for frame in frames:
-        truth, mask = drive.truth(frame), drive.final_masks(frame).get(name)
-        if truth is not None and mask is not None and (truth != IGNORE).any():
-            yield float(((mask == 1) != truth)[truth != IGNORE].mean())
 
 
 def _write_audit(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
@@ -217,24 +219,16 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         )
         return
     for frame, stamp, rates in rates_by_frame(finals(frames), [*SHORT]):
-        blind = rates.get(BASELINE)
-        others = {name: rate for name, rate in rates.items() if name != BASELINE}
-        words, conditions = [*notes(rates)], [*_frame_conditions(focus, others, blind)]
+        conditions: list[str] = []
+        if focus in rates and focus != BASELINE:
+            errors = defaultdict(lambda: math.nan, {name: rates[name][TESTED] for name in rates})
+            health = judge(rates[focus], rates.get(BASELINE))
+            change = errors[FILTERED] - errors[UNFILTERED]  # NaN without one of the two
+            holds = {
+                f"{focus} {health}": health is not Health.OK,
+                f"the filter {'harms' if change > 0 else 'helps'}": abs(change) >= NOTEWORTHY,
+                f"{focus} worse than {BASELINE}": errors[focus] > errors[BASELINE],
+            }
+            conditions = [words for words, is_true in holds.items() if is_true]
+        words = [*notes(rates)]
         yield NotableFrame(frame, stamp, focus, rates, notes=words, conditions=conditions)
-
-
-def _frame_conditions(
-    focus: str, rates: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
-) -> Iterator[str]:
-    """Yield what is true of a frame, in words: the health of the focus, and the filter."""
-    if focus not in rates:
-        return
-    health = judge(rates[focus], blind)
-    if health is not Health.OK:
-        yield f"{focus} {health}"
-    if FILTERED in rates and UNFILTERED in rates:
-        change = rates[FILTERED][TESTED] - rates[UNFILTERED][TESTED]
-        if abs(change) >= NOTEWORTHY:
-            yield "the filter harms" if change > 0 else "the filter helps"
-    if blind is not None and rates[focus][TESTED] > blind[TESTED]:
-        yield f"{focus} worse than {BASELINE}"

@@ -272,7 +272,22 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
     yield from (str(damage) for damage in run.log.damage if not damage.lossy)
     yield from (Sentence("{}: {}", run.selection.image.name, n) for n in run.selection.notes)
     yield from run.frames.accounting.notes
-    yield from _size_warnings(run)
+    selection, prior, scale = run.selection, run.model.prior, run.config.frames.scale
+    if scale != 1 and selection.image.size:
+        width, height = selection.image.size
+        yield (
+            f"the frames, {width}x{height} in the log, are reduced to "
+            f"{scale:g} of it: the numbers are not those of full frames"
+        )
+    if run.config.training.model is not None and prior is not None and selection.size:
+        width, height = selection.size
+        if prior.shape != (height, width):
+            yield (
+                f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
+                f"are {width}x{height}: texture and sizes in pixels mean something else there"
+            )
+    if selection.ground and (lens := selection.calibration) and selection.calibration_why:
+        yield Sentence("metres rest on {}: {}", lens.topic, selection.calibration_why)
     yield from _method_warnings(run)
     yield from _mask_warnings(run, totals)
     roles, settings = Counter(run.board.roles()), run.config.training
@@ -318,26 +333,6 @@ def _truth_warnings(run: Run) -> Iterator[str]:
         problem = "none of the frames that were read has road truth"
         remedy = Sentence("{frames.labelled} reads only frames that have")
         yield Sentence("{}{}; {}", problem, why if stride > 1 else "", remedy)
-
-
-def _size_warnings(run: Run) -> Iterator[str]:
-    """Yield how the sizes of frames, and what metres rest on, limit the results."""
-    selection, prior, scale = run.selection, run.model.prior, run.config.frames.scale
-    if scale != 1 and selection.image.size:
-        width, height = selection.image.size
-        yield (
-            f"the frames, {width}x{height} in the log, are reduced to "
-            f"{scale:g} of it: the numbers are not those of full frames"
-        )
-    if run.config.training.model is not None and prior is not None and selection.size:
-        width, height = selection.size
-        if prior.shape != (height, width):
-            yield (
-                f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
-                f"are {width}x{height}: texture and sizes in pixels mean something else there"
-            )
-    if selection.ground and (lens := selection.calibration) and selection.calibration_why:
-        yield Sentence("metres rest on {}: {}", lens.topic, selection.calibration_why)
 
 
 def _pick_warnings(run: Run) -> Iterator[str]:
