@@ -219,6 +219,8 @@ class FitCheck:
         """By subject, for each spot: the fit at each of `_MOVES`, and, without a move, the
         agreement with the image at each of `_GROWTHS`."""
         self._upside = defaultdict[str, list[float]](list)
+        """By subject, for each spot: the share of road in the upper quarter minus the share before
+        the vehicle, -1 to 1."""
         self._roads: list[Plane] = []
         """Road of the truth at each spot."""
 
@@ -280,7 +282,12 @@ class FitCheck:
             self._roads.append(subjects[TRUTH][0])
         masks = {}
         for name, (road, ignored) in subjects.items():
-            self._upside[name].append(_share_above(road, ignored))
+            height, width = road.shape
+            upper = slice(0, height // 4), slice(None)
+            before = slice(-height // 4, None), slice(width // 3, -(width // 3))
+            above, below = (road[part][ignored[part] == 0] > 0 for part in (upper, before))
+            excess = above.mean() - below.mean() if above.size and below.size else math.nan
+            self._upside[name].append(float(excess))
             edge = masks[name] = _Mask.of(road, ignored)
             if name != TRUTH and view.truth is not None:
                 normals = np.array([edge.normals.imag, edge.normals.real])[:, None]
@@ -390,12 +397,3 @@ def _best_move(name: str, spots: Sequence[tuple[Floats, Floats]]) -> tuple[Findi
     if near.max() > _CLEAR and is_alike:
         gain = _Gain()
     return Finding(name, Misfit.MOVED, right=right, down=down), gain
-
-
-def _share_above(road: Plane, ignored: Plane) -> float:
-    """Return the share of road in the upper quarter minus the share before the vehicle; -1 to 1."""
-    height, width = road.shape
-    upper = slice(0, height // 4), slice(None)
-    before = slice(-height // 4, None), slice(width // 3, -(width // 3))
-    above, below = (road[part][ignored[part] == 0] > 0 for part in (upper, before))
-    return float(above.mean() - below.mean()) if above.size and below.size else math.nan

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -137,29 +137,26 @@ def find_slices(
         values = parts.astype({**words, "region": "str"})
         wide = values.pivot_table(["wrong", "N"], on, "region", "sum")
         wide = wide.reindex(pd.MultiIndex.from_frame(table[on])).fillna(0)
-        for part, regions in _parts([*map(str, wide.columns.unique(1))]).items():
-            sums = [wide[n][regions].to_numpy(float).sum(axis=1) for n in ("wrong", "N")]
+        regions = [*map(str, wide.columns.unique(1))]
+        matches = filter(None, (re.fullmatch(r"(\d+)-(\d+)m", name) for name in regions))
+        ends = sorted((int(match[1]), int(match[2])) for match in matches)
+        distances = [f"{near}-{far}m" for near, far in ends]
+        bands = [name for name in regions if name.startswith("band_")]
+        regions_of = {distances[0]: distances[:1]} if ends else {}
+        for place, (near, _) in enumerate(ends[1:], 1):
+            regions_of[f"{near}-{ends[-1][1]}m"] = distances[place:]
+        for band in bands if not ends else ():  # rows stand for distances where these are unknown
+            first, last = (100 * (int(band[5:]) + more) // len(bands) for more in (0, 1))
+            regions_of[f"rows_{first}-{last}"] = [band]
+        regions_of |= {name: [name] for name in regions if name not in (*distances, *bands)}
+        for part, names in regions_of.items():
+            sums = [wide[n][names].to_numpy(float).sum(axis=1) for n in ("wrong", "N")]
             pixels[part] = np.array(sums)
     if over_drives:  # every drive counts the same
         of_drive = table.groupby("drive")["N"].transform("sum").to_numpy(float)
         pixels = {part: counts * (1 / of_drive) for part, counts in pixels.items()}
     search = _Search(table, columns, pixels, "drives" if over_drives else "frames")
     return search.slices(confidence)
-
-
-def _parts(regions: Collection[str]) -> dict[str, list[str]]:
-    """Return the regions of each part: distances from near to far, else rows; and all others."""
-    matches = filter(None, (re.fullmatch(r"(\d+)-(\d+)m", name) for name in regions))
-    ends = sorted((int(match[1]), int(match[2])) for match in matches)
-    names = [f"{near}-{far}m" for near, far in ends]
-    parts = {names[0]: names[:1]} if ends else {}
-    for place, (near, _) in enumerate(ends[1:], 1):
-        parts[f"{near}-{ends[-1][1]}m"] = names[place:]
-    bands = [name for name in regions if name.startswith("band_")]
-    for band in bands if not ends else ():
-        first, last = (100 * (int(band[5:]) + more) // len(bands) for more in (0, 1))
-        parts[f"rows_{first}-{last}"] = [band]
-    return parts | {name: [name] for name in regions if name not in (*names, *bands)}
 
 
 class _Search:

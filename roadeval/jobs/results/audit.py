@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, ROAD, colours
-from roadeval.data.arrays import Image, Plane
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score.label_errors import BLOCK, LabelledView, find_suspects, rank_suspects
 from roadeval.evaluation.tables import concatenate
@@ -146,7 +145,10 @@ def _write_audit(
     drive: DriveResult, suspects: pd.DataFrame, folder: Path, labels: str, run: str | None
 ) -> None:
     """Write images, labels to correct and pictures, and last what was found."""
+    import cv2
+
     recording, facts, rows = drive.recording, drive.facts, records(suspects)
+    square = np.ones((3, 3), np.uint8)
     assert recording is not None
     with writing(folder, RoadevalError):
         for part in (IMAGES, PROPOSALS, LABELS, SUSPECTS):
@@ -156,9 +158,16 @@ def _write_audit(
             frame, name = suspect["frame"], f"{suspect['stamp_ns']:019d}.png"
             image, truth = recording.image(frame), recording.truth(frame)
             proposals.append(Proposal(name, truth == ROAD, truth == IGNORE))
-            shown = f"{suspect['rank']:02d}_frame_{frame:04d}_{name}"
             (folder / IMAGES / name).write_bytes(png_of(image))
-            (folder / SUSPECTS / shown).write_bytes(png_of(_mark(image, truth, suspect)))
+            marked, road = image.copy(), truth == ROAD
+            marked[road] = 0.7 * marked[road] + 0.3 * np.array(colours.ROAD)
+            edge = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_GRADIENT, square)
+            marked[edge > 0] = colours.YELLOW
+            corner = suspect["left"] - 4, suspect["top"] - 4
+            opposite = suspect["right"] + 3, suspect["bottom"] + 3
+            cv2.rectangle(marked, corner, opposite, colours.VERMILLION, 3)
+            shown = f"{suspect['rank']:02d}_frame_{frame:04d}_{name}"
+            (folder / SUSPECTS / shown).write_bytes(png_of(marked))
         for name, content in proposal_files(proposals, labels).items():
             (folder / PROPOSALS / name).write_bytes(content)
         if run:
@@ -172,17 +181,3 @@ def _write_audit(
             "suspects": rows,
         }
         put(folder / AUDIT, f"{json.dumps(about, indent=1)}\n".encode())
-
-
-def _mark(image: Image, truth: Plane, suspect: Mapping[str, Any]) -> Image:
-    """Return an image with its road in green, edged yellow, and an orange box around an area."""
-    import cv2
-
-    marked, road, square = image.copy(), truth == ROAD, np.ones((3, 3), np.uint8)
-    marked[road] = 0.7 * marked[road] + 0.3 * np.array(colours.ROAD)
-    edge = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_GRADIENT, square)
-    marked[edge > 0] = colours.YELLOW
-    corner = suspect["left"] - 4, suspect["top"] - 4
-    opposite = suspect["right"] + 3, suspect["bottom"] + 3
-    cv2.rectangle(marked, corner, opposite, colours.VERMILLION, 3)
-    return marked
