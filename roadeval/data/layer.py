@@ -56,6 +56,9 @@ class LayerSpec:
     columns, as the means of blocks of pixels, of 400 columns at most, to 1/127 of half the range. A
     layer that is not exact is recorded with some loss, at half the resolution or as small as that.
     """
+    photographic: bool = False
+    """For `SCALAR`: whether it varies as a photograph does, without plateaus of one value. The
+    recording has it as a JPEG, to be looked at: within 3 of 256 levels on average."""
 
 
 @dataclass(frozen=True, eq=False)

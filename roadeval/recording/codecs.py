@@ -7,13 +7,19 @@ mask       PNG with a palette          the same array
 labels     raw class ids, LZ4          the same array (the viewer names the class under the mouse;
                                        a byte a pixel in its memory and in ours)
 scalar     grey PNG, coloured by the   the nearest of 256 levels over the range, of large images
-           viewer                      reduced; if not exact, 52 levels, reduced
+           viewer; if photographic,    reduced; if not exact, 52 levels, reduced; if photographic,
+           grey JPEG                   within 3 of 256 levels on average, reduced as the others
 rgb        PNG                         the same image; if not exact, a JPEG, reduced
 =========  ==========================  ============================================================
 
 A reduced image has the means of blocks of pixels, of two by two or of so many that at most
 `COLUMNS` columns are left: it is there to be looked at, and a map of 1920x1200 pixels takes twice
 the bytes of the camera's JPEG. An image is large if it has more than twice as many columns.
+
+A map's JPEG rounds all frequencies to multiples of the same step: with the same mean error it takes
+three quarters of the bytes that the usual tables take, which are made for eyes, and which OpenCV
+cannot change. Multiples of 12 leave a mean error of at most 2.8 levels, even on pure noise. Blocks
+of one level, as both ends of the range are where values lie beyond it, come back the same.
 
 Only ``columns`` imports Rerun: decoding does not need it.
 
@@ -29,6 +35,7 @@ References
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,8 +57,11 @@ from roadeval.recording.layout import CAMERA, DISTURBED, GROUND, Layout
 
 Array = npt.NDArray[Any]
 JPEG_QUALITY: Final = 90
-"""Quality of camera images that the log does not hold as JPEG or PNG, and of layers that need not
-be exact, which are also reduced."""
+"""Quality of camera images that the log does not hold as JPEG or PNG."""
+REDUCED_QUALITY: Final = 80
+"""Quality of colour images that need not be exact, which are also reduced."""
+STEPS: Final = [8] + [12] * 63
+"""Steps of the 8x8 frequencies of a map's JPEG; one of the first, for the mean, is one level."""
 
 COLUMNS: Final = 400
 """Most columns of a reduced image."""
@@ -98,7 +108,7 @@ class Codec:
 
     def encode(self, array: Any) -> bytes:
         """Return the bytes of a frame's array, here of ``(H, W, 3)`` uint8 RGB as a JPEG file."""
-        return _jpeg(array)
+        return _jpeg(array, JPEG_QUALITY)
 
     def fitted(self, array: Any) -> Array:
         """Return an array of a frame of another size in the recording's size."""
@@ -123,7 +133,7 @@ class ImageCodec(Codec):
 
     def encode(self, array: Array) -> bytes:
         """Return ``(H, W, 3)`` uint8 RGB as a file."""
-        return encode_levels(array) if self.spec.exact else _jpeg(_reduce(array))
+        return encode_levels(array) if self.spec.exact else _jpeg(_reduce(array), REDUCED_QUALITY)
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
@@ -168,18 +178,24 @@ class LabelCodec(Codec):
 
 
 class ScalarCodec(Codec):
-    """A map of numbers: a grey PNG whose levels span the range, coloured by the viewer."""
+    """A map of numbers: a grey image whose levels span the range, coloured by the viewer."""
 
     component = "EncodedDepthImage:blob"
 
     def encode(self, array: Array) -> bytes:
-        """Return a PNG file of ``(H, W)`` float32, or of uint8 codes that span the range."""
+        """Return an image file of ``(H, W)`` float32, or of uint8 codes that span the range."""
         if not self.spec.exact or self.width > 2 * COLUMNS:
             array = _reduce(array)
         if array.dtype != np.uint8:
             low, high = self.spec.value_range
             scaled = (array - np.float32(low)) * np.float32(255 / (high - low))
             array = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
+        if self.spec.photographic:
+            from PIL import Image
+
+            file = io.BytesIO()
+            Image.fromarray(array).save(file, "JPEG", qtables=[STEPS])
+            return file.getvalue()
         if not self.spec.exact:
             array = np.asarray(cv2.LUT(array, _FIFTHS), np.uint8)
         return encode_levels(array)
@@ -199,9 +215,9 @@ def _reduce(array: Array) -> Array:
     return cv2.resize(array, size, interpolation=cv2.INTER_AREA)
 
 
-def _jpeg(rgb: Array) -> bytes:
+def _jpeg(rgb: Array, quality: int) -> bytes:
     bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
-    return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
 def limits_for(width: int, height: int) -> Limits:

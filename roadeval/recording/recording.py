@@ -180,7 +180,8 @@ class Recording:
         -------
         array
             Masks and labels: ``(H, W)`` uint8, as the stage made them. Maps of numbers:
-            ``(H, W)`` float32 in their own unit. Images: ``(H, W, 3)`` uint8 RGB.
+            ``(H, W)`` float32 in their own unit, approximate: NDI within 3 of 256 levels on
+            average, distances at half the resolution. Images: ``(H, W, 3)`` uint8 RGB.
         """
         return self._array(f"/{variant}/{name}", frame)
 

@@ -373,6 +373,7 @@ _ERRORS: Final = """\
 """
 _ROW_GUIDE: Final = """\
 **Rows:** the phases of {rows} from left to right; *green* is what a phase calls road.
+Masks are recorded exactly, maps of numbers approximately.
 {others}
 """
 _CURVES: Final = """\
@@ -424,10 +425,9 @@ def _style(codec: Codec) -> list[Any]:
             labels = rr.SegmentationImage.from_fields(format=pixels, opacity=1.0, draw_order=10)
             return [rr.AnnotationContext(classes), labels]
         case LayerKind.SCALAR:  # the viewer takes grey levels for fractions, in any unit
-            viridis = rr.components.Colormap.Viridis
             return [
                 rr.EncodedDepthImage.from_fields(
-                    media_type="image/png", meter=1.0, depth_range=(0.0, 1.0), colormap=viridis
+                    meter=1.0, depth_range=(0.0, 1.0), colormap=rr.components.Colormap.Viridis
                 )
             ]
         case LayerKind.RGB:

@@ -5,11 +5,13 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from roadeval import compare
 from roadeval.errors import RoadevalError
 from roadeval.jobs.results.history import find_results, history, write
+from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import Figure
 from roadeval.report.history import document
 from roadeval.results.history import verdict
@@ -59,6 +61,49 @@ def test_the_run_that_is_worse_is_named_with_what_changed(made):
     assert {drive for drive, _, _ in event.frames} == set(event.first.drives["drive"][:2])
     assert [run.title for run in made.runs][::7] == ["1972-09-27", "1972-10-04"]
     assert "in the run of 1972-10-02 (55555555), on 2 of 6 drives" in verdict(made)
+
+
+def test_drives_and_fleets_are_read_in_batches_with_the_rates_that_their_tables_hold(
+    nights, monkeypatch
+):
+    monkeypatch.setattr("roadeval.jobs.results.history.BATCH", 3)
+    drive = next((nights / "7" / "results").glob("drive_0003*/"))
+    made = history([*(nights / f"{night}" for night in range(8)), drive])
+    assert {line.variant for line in made.lines} == {"filtered", "unfiltered"}
+    lines = [line for line in made.lines if (line.variant, line.rate) == ("filtered", "ERR")]
+    assert {line.kind for line in lines} == {"all", "region", "weather", "place"}
+    (everywhere,) = (line for line in lines if line.kind == "all")
+    for run, path in enumerate([*(nights / f"{night}" for night in range(8)), drive]):
+        scores = Result(path).scores
+        scores = scores[scores["final"] & (scores["variant"] == "filtered")]
+        for line in lines:
+            part = line.part if line.kind == "region" else "all"
+            rates = scores[scores["region"] == part].set_index("drive")["ERR"]
+            has_tags = run < 8 or line.kind in ("all", "region")
+            there = rates.index.isin(line.drives["drive"]) & has_tags
+            of_run = line.drive_rates[run][np.isfinite(line.drive_rates[run])]
+            np.testing.assert_array_equal(sorted(of_run), sorted(rates[there]))
+    assert np.isfinite(everywhere.drive_rates).sum(axis=1).tolist() == [6] * 8 + [1]
+
+
+def test_a_class_is_a_line_by_its_name_or_its_number(nights, tmp_path):
+    folder = copy_sums(nights, tmp_path / "nights")
+    rows = read_parquet([folder / "0" / "drives.parquet"], "drives")[["drive", "camera"]]
+    rows = rows.assign(variant="filtered", beside=0, frames=20, worst="")
+    pavement = rows.assign(**{"class": 4, "name": "pavement"}, truth="other", pixels=100, road=7)
+    unnamed = rows.assign(**{"class": 11, "name": ""}, truth="road", pixels=50, road=40)
+    for night in (*range(3), *range(4, 8)):
+        table = pd.concat([pavement, unnamed])
+        write_parquet({folder / f"{night}" / "classes.parquet": ("classes", table)})
+    (folder / "3" / "classes.parquet").unlink(missing_ok=True)
+    made = history(folder)
+    assert not made.lost
+    of_classes = {line.part: line.rates for line in made.lines if line.kind == "class"}
+    assert [*of_classes] == ["pavement", "class 11"]
+    there = np.arange(8) != 3
+    np.testing.assert_allclose(of_classes["pavement"][there], 0.07)
+    np.testing.assert_allclose(of_classes["class 11"][there], 0.2)
+    assert np.isnan(of_classes["pavement"][3])
 
 
 def test_results_that_share_a_label_are_one_run(nights):

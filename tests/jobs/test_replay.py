@@ -4,6 +4,7 @@ import shutil
 import time
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -14,6 +15,7 @@ from roadeval.jobs.run import prepared
 from roadeval.jobs.run import replay as replaying
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LogConfig, TopicSettings
+from roadeval.pipeline.paper.shadow import NDI_CODES, otsu_threshold
 from roadeval.report import figures as drawn
 from roadeval.results import schema
 from roadeval.results.facts import Origin
@@ -21,6 +23,7 @@ from roadeval.results.folder import ResultsFolder
 from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
+DEMO = Path(__file__).resolve().parents[2] / "recordings" / "demo.mcap"
 TABLES = tuple(n for n in schema.OF_A_DRIVE if n not in ("probabilities", "classes"))
 """Those of runs in which nothing says how probable road is."""
 
@@ -138,6 +141,30 @@ def test_pictures_are_recorded_by_the_rule(drive, tmp_path, rule, pictured, laye
         else:
             with pytest.raises(RoadevalError):
                 recording.layer("filtered", layer, 14)
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """A recording of the demo's first frames, of which some are evaluated."""
+    save = tmp_path_factory.mktemp("demo") / "out.rrd"
+    done = roadeval.replay(
+        DEMO, settings(max_frames=14), save=save, reports=save.parent / "reports"
+    )
+    return roadeval.Recording(done.recording)
+
+
+def test_the_demos_shadow_mask_follows_from_its_image_and_the_recorded_threshold(demo):
+    thresholds = demo.scalars("/facts/filtered/shadow/threshold")
+    for frame in demo.frame_numbers:
+        image = demo.image(frame)
+        code = (thresholds[frame] + 1) * 127.5
+        assert code == pytest.approx(round(code), abs=1e-9)
+        codes = NDI_CODES[image.sum(axis=2, dtype=int), image.min(axis=2)]
+        assert otsu_threshold(np.bincount(codes.ravel(), minlength=256)) == round(code)
+        shadow = demo.layer("filtered", "shadow", frame)
+        np.testing.assert_array_equal(shadow, codes > round(code))
+        ndi = (demo.layer("filtered", "ndi", frame) + 1) * 127.5
+        assert 0.1 < np.abs(ndi - codes).mean() < 3
 
 
 @pytest.fixture

@@ -214,6 +214,37 @@ def test_a_number_map_that_need_not_be_exact_comes_back_nearly_and_at_full_size(
     assert np.abs(back - 6 * RAMP).max() < 0.5
 
 
+PHOTOGRAPHIC = replace(NDI, photographic=True)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_photographic_map_comes_back_within_3_levels_on_average_even_if_it_is_noise(seed):
+    codes = np.random.default_rng(seed).integers(0, 256, (96, 128)).astype(np.uint8)
+    error = np.abs((there_and_back(PHOTOGRAPHIC, codes) + 1) * 127.5 - codes)
+    assert 1 < error.mean() < 3
+    assert error.max() < 32
+
+
+def test_both_ends_of_the_range_of_a_photographic_map_come_back_the_same_inside_their_areas():
+    codes = DRAW.integers(20, 236, (64, 64)).astype(np.uint8)
+    codes[:19], codes[40:] = 0, 255
+    back = there_and_back(PHOTOGRAPHIC, codes)
+    np.testing.assert_array_equal(back[:16], -1)
+    np.testing.assert_allclose(back[40:], 1, atol=1e-6)
+    beyond = np.where(codes == 255, np.inf, np.where(codes == 0, -np.inf, 0)).astype(np.float32)
+    np.testing.assert_allclose(there_and_back(PHOTOGRAPHIC, beyond)[40:], 1, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spec", "signature"), [(NDI, b"\x89PNG"), (PHOTOGRAPHIC, b"\xff\xd8\xff")]
+)
+def test_a_photographic_map_is_a_jpeg_whose_kind_the_viewer_takes_from_its_bytes(spec, signature):
+    chosen = codec(spec, WIDTH, HEIGHT)
+    assert chosen.encode(RAMP).startswith(signature)
+    (style,) = views._style(chosen)
+    assert style.media_type is None
+
+
 def test_an_image_that_need_not_be_exact_comes_back_nearly_and_at_full_size():
     spec = LayerSpec("compensated", LayerKind.RGB, "", exact=False)
     image = np.dstack([255 * RAMP, 255 - 255 * RAMP, 128 + 0 * RAMP]).astype(np.uint8)

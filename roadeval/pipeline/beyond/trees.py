@@ -191,6 +191,7 @@ GEODESIC: Final = LayerSpec(
     "Distance from the reference patch over edges; roads end at about 1",
     value_range=(0.0, FARTHEST),
     exact=False,
+    photographic=True,
 )
 
 

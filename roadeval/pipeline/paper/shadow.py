@@ -34,7 +34,9 @@ from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_setting
 SHADOW_COLOUR: Final = (*colours.SHADOW, 160)
 RING_COLOUR: Final = (*colours.RING, 220)
 
-NDI: Final = LayerSpec("ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0))
+NDI: Final = LayerSpec(
+    "ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0), photographic=True
+)
 SHADOW: Final = mask_spec("shadow", "Shadow mask (Eq. 8)", lit=colours.CLEAR, shadow=SHADOW_COLOUR)
 RINGS: Final = mask_spec(
     "rings",

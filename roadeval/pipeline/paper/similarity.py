@@ -97,7 +97,9 @@ def layers(settings: SimilaritySettings) -> tuple[LayerSpec, LayerSpec]:
     """Return the layers of phase 1: the distance is shown from 0 to three times the limit."""
     span = (0.0, 3.0 * limit(settings.quantile) ** 0.5)
     title = "Mahalanobis distance to road (Eq. 2)"
-    distance = LayerSpec("distance", LayerKind.SCALAR, title, value_range=span, exact=False)
+    distance = LayerSpec(
+        "distance", LayerKind.SCALAR, title, value_range=span, exact=False, photographic=True
+    )
     return distance, SIMILARITY
 
 
