@@ -5,8 +5,9 @@
 #   DRIVES    a drive, or a folder or list of drives
 #   ARGS      more options of replay or fleet, apart by spaces
 #   FAIL_IF   conditions of compare, one a line
-#   BASELINE  the last good result, or its URL; .roadeval/base by default. None yet: passes
-#   KEEP      1: a result that passed becomes the baseline
+#   BASELINE  the last good result, its URL, or a folder of runs; .roadeval/base by default. None
+#             yet: passes
+#   KEEP      1: a result that passed becomes the baseline, or one more run of the folder
 #   NAME      name of the check; each has its comment
 #   TOKEN     token that writes the comment; without one there is none
 #
@@ -52,7 +53,13 @@ fi
   printf '## roadeval: failed, %s\n\n' "$what"
   tail -n 20 .roadeval/errors.txt | cut -c 1-1000 | sed 's/^/    /'
 } > .roadeval/comment.md
-[ "$code" != 0 ] || [ "${KEEP:-}" != 1 ] || { rm -rf "$base" && cp -R "$new" "$base"; }
+if [ "$code" = 0 ] && [ "${KEEP:-}" = 1 ]; then
+  # A folder of runs has one more.
+  [ ! -d "$base" ] || [ -e "$base/summary.json" ] || [ -e "$base/fleet.json" ] ||
+    base=$base/$(date +%s)
+  rm -rf "$base"
+  cp -R "$new" "$base"
+fi
 
 [ -z "${GITHUB_STEP_SUMMARY:-}" ] || cat .roadeval/comment.md >> "$GITHUB_STEP_SUMMARY"
 python=$(command -v python3 || command -v python)

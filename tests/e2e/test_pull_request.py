@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -193,6 +194,15 @@ def test_a_push_that_fails_is_no_baseline(check):
     before = (check.repository / ".roadeval" / "base" / "frames.csv").read_bytes()
     assert check("bad", {}).returncode == 4
     assert (check.repository / ".roadeval" / "base" / "frames.csv").read_bytes() == before
+
+
+@pytest.mark.sweep
+def test_a_folder_of_runs_as_baseline_has_one_run_more(check, results):
+    runs = check.repository / "runs"
+    shutil.copytree(results / "good", runs / "1")
+    assert check("good", {}, BASELINE="runs").returncode == 0
+    assert len([*runs.glob("*/summary.json")]) == 2
+    assert (runs / "1" / "summary.json").is_file()
 
 
 @pytest.mark.sweep

@@ -1,6 +1,7 @@
 """The lines of a history: which drives are paired, and what a step is worth."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -162,14 +163,31 @@ def test_a_condition_on_what_is_not_there_is_not_judged():
     assert "no drive" in change.why
 
 
-def test_the_only_drive_is_judged_over_its_frames():
-    rows = rows_of(lambda run, drive: 0.02 * (run >= 7) if drive == "a" else math.nan)
+def test_the_only_drive_is_judged_over_its_frames_of_the_runs_that_count():
+    def added(run, drive):  # in run 4 one stands out, and one drive goes
+        here = run != 1 if drive == "a" else drive == "b" and run < 3
+        return 0.1 * (run == 4) + 0.02 * (run >= 7) if here else math.nan
+
     asked = []
 
     def within(line, before, after):
-        asked.append((before, after))
+        asked.append((line.drives["drive"].tolist(), before, after))
         return find_changes([eight], 0.95, no_frames)[0].difference
 
     eight = lines_of(rows_of(lambda run, drive: 0.02 * (run >= 7)))[ERR]
-    find_changes([lines_of(rows)[ERR]], 0.95, within)
-    assert asked == [(range(7), range(7, 12))]
+    line = lines_of(rows_of(added))[ERR]
+    _, step = find_changes([line], 0.95, within)
+    assert asked == [(["a"], [0, 2, 3], [4]), (["a"], [0, 2, 3, 5, 6], [7, 8, 9, 10, 11])]
+    # Without its frames there is no interval.
+    nothing = replace(step.difference, mean=math.nan)
+    _, step = find_changes([line], 0.95, lambda *_: nothing)
+    assert (step.difference.mean, step.difference.low) == (pytest.approx(0.02), None)
+
+
+@pytest.mark.parametrize("tag", ["all", "region", "class"])
+def test_a_tag_that_is_called_as_a_kind_of_pixels_is_no_such_kind(tag):
+    column = f"tag_{tag}"
+    lines = find_lines(rows_of().assign(**{column: "all"}), {column: tag}, RUNS, 0.95)
+    titles = {line.title: (line.kind, line.part) for line in lines}
+    assert [*titles] == ["ERR", "FPR", "FNR", f"ERR, {column} all"]
+    assert titles[f"ERR, {column} all"] == (column, "all")

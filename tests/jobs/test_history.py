@@ -113,6 +113,8 @@ def test_results_that_share_a_label_are_one_run(nights):
     ]
     # Of a drive that a run has twice the later result counts.
     assert [event.run for event in made.events] == [2]
+    assert made.lost == []
+    assert [line.title for line in made.lines] == [line.title for line in history(nights).lines]
 
 
 def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path):
@@ -126,6 +128,21 @@ def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path)
     assert len(made.lost) == 2
     assert "whose format is no longer read" in made.lost[0]
     assert "scores.parquet: damaged" in made.lost[1]
+
+
+def test_many_results_are_read_in_parts_and_results_of_a_drive_as_a_fleet(
+    nights, made, monkeypatch
+):
+    monkeypatch.setattr("roadeval.jobs.results.history.BATCH", 3)
+    for line, other in zip(made.lines, history(nights).lines, strict=True):
+        np.testing.assert_array_equal(line.drive_rates, other.drive_rates)
+    name = "drive_0003-00000003"
+    first, worse = (find_results(nights / f"{night}" / "results" / name) for night in (0, 5))
+    of_drive = history([*first, nights / "1", *worse])
+    (column,) = np.flatnonzero(made.lines[0].drives["drive"] == name)
+    (line,) = (line for line in of_drive.lines if line[:5] == made.lines[0][:5])
+    rates = line.drive_rates[1:, line.drives["drive"] == "drive_0003"].ravel()
+    np.testing.assert_array_equal(rates, made.lines[0].drive_rates[[0, 5], column])
 
 
 def test_two_logs_of_one_name_in_a_run_are_told(nights, tmp_path):

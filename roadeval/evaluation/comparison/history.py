@@ -42,7 +42,7 @@ class Line(NamedTuple):
     stage: str
     """The stage of the final mask."""
     kind: str
-    """``all`` pixels, those of a ``region`` or a ``class``, or the name of the drives' tag."""
+    """``all`` pixels, a ``region``, a ``class``, or a tag: its column if that is its name, too."""
     part: str
     """The region, the class, or the value of the tag."""
     rate: str
@@ -99,10 +99,9 @@ def find_lines(
     for column, tag in tags.items():
         tagged = np.flatnonzero((rows["kind"] == ALL) & rows[column].notna())
         by_value = group_rows(rows.iloc[tagged], ["variant", column]).indices
-        places |= {(variant, tag, value): tagged[n] for (variant, value), n in by_value.items()}
-    searched = [
-        (*map(str, key), n, RATES if ALL in key else RATES[:1]) for key, n in places.items()
-    ]
+        kind = column if tag in (ALL, "region", "class") else tag
+        places |= {(variant, kind, value): tagged[n] for (variant, value), n in by_value.items()}
+    searched = [(*map(str, k), n, RATES if k[1] == ALL else RATES[:1]) for k, n in places.items()]
     family = sum(len(rates) for *_, rates in searched)
     regions = titles(values_of(only(rows, kind="region"), "part"))
     lines: list[Line] = []
@@ -199,7 +198,7 @@ def _stretches(there: Flags) -> Iterator[Sums]:
         yield np.array(runs)
 
 
-Within = Callable[[Line, range, range], Difference]
+Within = Callable[[Line, Sequence[int], Sequence[int]], Difference]
 """Returns the difference of a line within its only drive, from some runs to others, over frames."""
 
 
@@ -228,15 +227,18 @@ def _difference(
         warnings.simplefilter("ignore", RuntimeWarning)  # a drive that is in none of the runs
         # A run that stands out says nothing of the level beside it.
         out = {step.run for step in line.steps if step.kind == "outlier"}
-        sides = ([run for run in runs if run not in out] or runs for runs in (before, after))
-        old, new = (np.nanmean(line.drive_rates[[*runs]], axis=0) for runs in sides)
+        sides = [[run for run in runs if run not in out] or [*runs] for runs in (before, after)]
+        old, new = (np.nanmean(line.drive_rates[runs], axis=0) for runs in sides)
     # Means of equal numbers may differ in their last digit.
     rows = line.drives.assign(before=old, after=new, mean=(new - old).round(12))
     rows = rows[rows["mean"].notna()]
     rows = rows.iloc[np.argsort(-np.abs(rows["mean"].to_numpy()), kind="stable")]
     difference = over_drives(rows, confidence, line.rate)
     if len(rows) == 1 and line.kind == ALL:
-        difference = within(line, before, after)
+        there = ~np.isnan(line.drive_rates[:, line.drives.index == rows.index[0]])
+        scored = ([run for run in runs if there[run]] for runs in sides)
+        within_it = within(line._replace(drives=rows), *scored)
+        difference = difference if math.isnan(within_it.mean) else within_it  # frames may be gone
     return difference, rows
 
 
@@ -271,10 +273,8 @@ def judge_last(
             yield condition.not_judged(label, why)
             continue
         if difference.low is not None and difference.high is not None:
-            noise = 2 * line.noise * math.sqrt(1 + 1 / len(runs[0]))
-            ends = (difference.mean - difference.low, difference.high - difference.mean)
-            low, high = (math.hypot(end, noise) for end in ends)
-            mean = difference.mean
+            mean, noise = difference.mean, 2 * line.noise * math.sqrt(1 + 1 / len(runs[0]))
+            low, high = (math.hypot(mean - end, noise) for end in (difference.low, difference.high))
             difference = replace(difference, low=mean - low, high=mean + high)
         base, new = difference.mean and line.rates[-1] - difference.mean, line.rates[-1]
         rate = condition.rate

@@ -300,15 +300,15 @@ def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> 
 
 
 def _within_drive(
-    read: ReadFrames, settings: EvaluationSettings, line: search.Line, before: range, after: range
+    read: ReadFrames, settings: EvaluationSettings, line: search.Line, *sides: Sequence[int]
 ) -> Difference:
     """Return the change of a line within its only drive, over frames, as `Within` does."""
-    (drive,) = line.drives[KEY].drop_duplicates().itertuples(index=False, name=None)
-    sides = []
-    for runs in (before[-NEAR:], after[:NEAR]):
+    (drive,) = line.drives[KEY].itertuples(index=False, name=None)
+    means = []
+    for runs in (sides[0][-NEAR:], sides[1][:NEAR]):
         rows = concatenate([only(read(run, drive), variant=line.variant) for run in runs])
-        sides.append(rows.groupby(["camera", "stamp_ns"], observed=True)[line.rate].mean())
-    pairs = sides[0].to_frame(f"{line.rate}_base").join(sides[1], how="inner").reset_index()
+        means.append(rows.groupby(["camera", "stamp_ns"], observed=True)[line.rate].mean())
+    pairs = means[0].to_frame(f"{line.rate}_base").join(means[1], how="inner").reset_index()
     return within_drive(pairs, line.rate, settings)
 
 
