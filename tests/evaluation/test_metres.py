@@ -120,6 +120,12 @@ def test_the_free_distance_ends_with_the_mask(far: int):
     assert end[1] == pytest.approx(80, abs=0.1)
 
 
+def test_a_mask_without_road_ahead_is_free_up_to_the_nearest_labelled_place():
+    found = measured(road(3, 3, 0), road(3, 3))
+    (end,) = (e for e, (name, _) in zip(found.ends[0], found.measures, strict=True) if name == FREE)
+    assert end[0] == pytest.approx(np.nanmin(AHEAD[AHEAD > 0]), abs=0.5)
+
+
 def test_what_the_truth_does_not_know_ahead_is_not_counted():
     truth = road(3, 3)
     truth[AHEAD > 25] = 255

@@ -52,6 +52,12 @@ def pairs_of(found):
             [],
             ["1 drive is left out of base (of another log in new): a"],
         ),
+        (  # a result that does not say which log it is of
+            [("a", "1")],
+            [("a", None)],
+            [],
+            ["1 drive is left out of base (log unknown): a"],
+        ),
     ],
 )
 def test_drives_of_one_name_and_log_are_one_and_all_others_are_told(base, new, pairs, left):
