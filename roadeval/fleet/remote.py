@@ -36,7 +36,7 @@ from roadeval.fleet.drives import (
     public_source,
     scheme_of,
 )
-from roadeval.logs.log import RemoteLog
+from roadeval.logs.log import RemoteLog, Traffic
 from roadeval.results.facts import FETCHED, FLEET, SUMMARY
 from roadeval.runtime.threads import in_thread
 
@@ -50,6 +50,8 @@ PATIENCE_S: Final = 20.0
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 PART: Final = 64 << 10
 """Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
+TAIL: Final = 128 << 10
+"""Bytes at the end that are read at once, and kept: the summary of a log of one gigabyte."""
 ROOM: Final = 2 << 30
 """Bytes of a result that are fetched, and unpacked, at most."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
@@ -87,7 +89,7 @@ def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> P
         return Path(source)
     name, place = Path(file_name(source)), _open_store(source, patience_s)
     file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
-    return RemoteLog(public_source(source), name, file)
+    return RemoteLog(public_source(source), name, file, place.traffic)
 
 
 @cache
@@ -158,7 +160,7 @@ class _RemoteFile:
         self._place, self._state, self._size, self._at = place, state, state.size, 0
         tag = state.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
-        self._begin, self._part = 0, b""
+        self._begin, self._part, self._tail = 0, b"", b""
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + (self._size if whence == os.SEEK_END else 0)
@@ -166,6 +168,11 @@ class _RemoteFile:
 
     def read(self, size: int) -> bytes:
         begin, end = self._at, min(self._at + size, self._size)
+        tail = max(self._size - TAIL, 0)
+        if begin >= tail:
+            self._tail = self._tail or self._fetch(tail, self._size)
+            self._at = max(begin, end)
+            return self._tail[begin - tail : self._at - tail]
         if not self._begin <= begin <= end <= self._begin + len(self._part):
             self._part = self._fetch(begin, min(max(end, begin + PART), self._size))
             self._begin = begin
@@ -196,6 +203,8 @@ class _RemoteFile:
                 raise
             problem = "the server gives no parts of files"
             raise FleetError(problem, where=where, remedy="copy the file here") from None
+        self._place.traffic.requests += 1
+        self._place.traffic.bytes += len(content)
         if state.differs(self._state):
             raise FleetError(CHANGED, where=where)
         if len(content) != end - begin:
@@ -204,7 +213,7 @@ class _RemoteFile:
         return content
 
     def close(self) -> None:
-        self._part = b""
+        self._part = self._tail = b""
 
 
 def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:
@@ -221,17 +230,20 @@ class _Place(NamedTuple):
 
     url: str
     store: Any
+    traffic: Traffic
     key: str = ""
 
 
 def _state_of(place: _Place) -> _FileState:
     import obstore
 
+    place.traffic.requests += 1
     try:
         return _FileState.of(_ask(place.url, obstore.head, place.store, place.key))
     except FleetError as error:  # a signed URL may allow nothing but reading
         if error.problem == SILENT:
             raise
+        place.traffic.requests += 1
         return _FileState.of(_ask(place.url, obstore.get, place.store, place.key).meta)
 
 
@@ -258,7 +270,7 @@ def _open_store(url: str, patience_s: float) -> _Place:
         # obstore ignores this variable if any option is given.
         allowed = {**times, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
         store = _ask(url, kind, bucket, client_options=allowed, retry_config=retries)
-        return _Place(url, store, key)
+        return _Place(url, store, Traffic(), key)
     parts = urlsplit(url)
     user, at, host = parts.netloc.rpartition("@")
     plain = urlunsplit((parts.scheme, host, parts.path, parts.query, ""))
@@ -267,7 +279,7 @@ def _open_store(url: str, patience_s: float) -> _Place:
         basic = b64encode(unquote(user).encode()).decode()
         options["default_headers"] = {"authorization": f"Basic {basic}"}
     store = _ask(url, stores.HTTPStore, plain, client_options=options, retry_config=retries)
-    return _Place(url, store)
+    return _Place(url, store, Traffic())
 
 
 def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: Any) -> Answer:

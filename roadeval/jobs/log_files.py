@@ -36,8 +36,9 @@ def info(
     config
         What a replay would be asked for.
     verify
-        Whether the log is read whole, so that all damage is found; one of at most 50 MB is in any
-        case.
+        Whether the log is read whole, so that all damage is found; one of at most 50 MB on a disk
+        is in any case. Of one behind a URL only the summary and the first messages are read
+        otherwise, if it has a summary.
     on_progress
         Called now and then while the log is read whole, in megabytes.
 
@@ -50,12 +51,13 @@ def info(
     def step(done: int, total: int) -> None:
         on_progress(Progress(done // MB, total // MB, "verifying", unit="MB"))
 
-    described = describe(open_source(drive), config, verify=verify, on_bytes=step)
+    source = open_source(drive)
+    described = describe(source, config, verify=verify, on_bytes=step)
     if config is None or not config.truth.path or described.problem:
         return described
     from roadeval.jobs.run.summary import misfits_of_truth
 
-    with open_log(open_source(drive), config) as log:
+    with open_log(source, config) as log:
         return replace(described, misfits=(*misfits_of_truth(log),))
 
 

@@ -18,11 +18,13 @@ import numpy as np
 from roadeval.data.words import counted
 from roadeval.images.formats import Limits
 from roadeval.logs.container.file import Container, Damage, containers_in, damage_of
+from roadeval.logs.container.outline import outline_of
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import BadRecord, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import content_problem, files_of
 from roadeval.logs.frames import (
     TRUTH,
+    WHITE,
     FrameStream,
     Selection,
     labelled_numbers,
@@ -33,15 +35,30 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.calibration import image_names
-from roadeval.logs.topics.choose import check_names, choose_truth, named
+from roadeval.logs.topics.choose import check_names, choose_image, choose_truth, named
 from roadeval.logs.topics.reader import SMALL, TopicInfo, TopicReader, describe_topic, topic_readers
 from roadeval.logs.truth.audits import without_corrections
 from roadeval.logs.truth.label_files import labels_in
-from roadeval.logs.truth.meaning import LabelSource, class_names, log_and_topic, source_beside_log
+from roadeval.logs.truth.meaning import (
+    ClassMap,
+    LabelSource,
+    class_names,
+    log_and_topic,
+    source_beside_log,
+)
 from roadeval.logs.truth.named_labels import find_keys, shown_name
+from roadeval.logs.truth.pairing import LOOKED_AT, Clock
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.sentence import Sentence, Setting, name_settings
 from roadeval.runtime.text import visible
+
+
+@dataclass(slots=True)
+class Traffic:
+    """The requests to a server so far, and the bytes of files in its answers."""
+
+    requests: int = 0
+    bytes: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +70,21 @@ class RemoteLog:
     path: Path
     """Its name."""
     file: IO[bytes]
+    traffic: Traffic
 
 
 def open_log(
-    path: str | Path | RemoteLog, config: LogConfig | None = None, *, every_topic: bool = False
+    path: str | Path | RemoteLog,
+    config: LogConfig | None = None,
+    *,
+    every_topic: bool = False,
+    by_summary: bool = False,
 ) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
-    By default messages of no use for a replay are only counted. A `LogError` if it is missing,
-    unreadable, or no MCAP log.
+    By default messages of no use for a replay are only counted. With ``by_summary`` only the first
+    messages of a log that lies elsewhere are there, see `outline_of`, unless its summary does not
+    suffice. A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
@@ -80,23 +103,33 @@ def open_log(
                 states[file] = _state(os.fstat(content.fileno()))
     frames = config.frames
     limits = Limits(frames.max_pixels, turn=not frames.unturned, full_range=frames.full_range)
+
+    def wanted(*channel: Any) -> bool:
+        return every_topic or kind_of(*channel) is not TopicKind.OTHER
+
+    def several(*channel: Any) -> bool:
+        return kind_of(*channel) is TopicKind.TRANSFORMS
+
     try:
-        containers = [
-            container
-            for file in files
-            for container in containers_in(
-                file,
-                lambda *channel: every_topic or kind_of(*channel) is not TopicKind.OTHER,
-                message_stamp,
-                opened=opened,
-            )
-        ]
+        outline = None
+        if by_summary and opened is not None:
+            outline = outline_of(path, opened, wanted, several, message_stamp)
+        containers = (
+            [outline]
+            if outline
+            else [
+                container
+                for file in files
+                for container in containers_in(file, wanted, message_stamp, opened=opened)
+            ]
+        )
         readers = topic_readers(containers, limits, lacks_files=bool(damage))
         topics = tuple(describe_topic(reader) for _, reader in sorted(readers.items()))
     except (BadRecord, OSError) as error:
         raise LogError(str(error), where=path) from error
     name = path.stem if path.is_file() or opened is not None else path.resolve().name
-    return Log(path, source, visible(name), config, topics, readers, containers, damage, states)
+    facts = path, source, visible(name), config, topics, readers, containers, damage, states
+    return Log(*facts, by_summary=outline is not None)
 
 
 def _state(facts: os.stat_result) -> tuple[int, ...]:
@@ -128,6 +161,8 @@ class Log:
     """Whether other cameras of the log are replayed, too."""
     beside: list[Log] = field(default_factory=list)
     """Other logs that hold labels; they are closed with this one."""
+    by_summary: bool = False
+    """Whether of its messages only the first ones are there."""
 
     @cached_property
     def start_ns(self) -> int:
@@ -317,6 +352,15 @@ class Log:
             names=class_names(reader.name, other.topics, other.readers),
         )
 
+    @property
+    def has_camera(self) -> bool:
+        """Whether it is clear which topic has the camera's images."""
+        try:
+            choose_image(self.topics, self.config.topics.image)
+        except LogError:
+            return False
+        return True
+
     def for_camera(self, config: LogConfig) -> Log:
         """Return the same open log with the settings of one camera of a rig."""
         return replace(self, config=config, of_rig=True)
@@ -426,11 +470,16 @@ class LogDescription:
     losses: tuple[str, ...]
     """The damage of the files, and the losses by it, a sentence each."""
     digest: str
-    """The log's identity, see `Log.digest`."""
+    """The log's identity, see `Log.digest`; empty if only its first messages were read."""
     verified: bool
     """Whether the log was read completely; if not, damage inside chunks is unknown."""
     sha256: str | None
     """SHA-256 of a log that was read completely, see `Log.verify`."""
+    by_summary: bool = False
+    """Whether only the summary and the first messages were read: damage, gaps, and values of labels
+    that occur later are unknown then."""
+    traffic: Traffic | None = None
+    """What was read of a log that lies elsewhere."""
     misfits: tuple[str, ...] = ()
     """How truth that lies beside the log does not fit its images, a sentence each."""
 
@@ -445,21 +494,37 @@ def describe(
     *,
     verify: bool = False,
     on_bytes: Callable[[int, int], object] | None = None,
+    by_summary: bool = True,
 ) -> LogDescription:
     """Describe a log by its summary and indexes, and what a replay would choose of it.
 
     With ``verify``, or if it has at most `SMALL` bytes, it is read completely to find all damage;
-    ``on_bytes`` is that of `Log.verify`. A `LogError` if the log is missing, unreadable, or no MCAP
-    log.
+    ``on_bytes`` is that of `Log.verify`. Of a log that lies elsewhere only the summary and the
+    first messages are read without ``verify``, unless they do not suffice. A `LogError` if the log
+    is missing, unreadable, or no MCAP log.
     """
-    with open_log(path, config) as log:
+    config = config or LogConfig()
+    # Labels beside the log, and the images of one of several cameras, are sought all over it.
+    needs_all = verify or config.truth.path or config.masks or config.topics.frame_id is not None
+    with open_log(path, config, by_summary=by_summary and not needs_all) as log:
         picks, problem = tuple[str, ...](), ""
+        is_certain = True
         try:
             selection = log.select()
             picks = (*selection.reasons, *look_at_images(selection))
+            camera, meanings = selection.camera, [s.meaning for s in selection.labels.values()]
+            is_certain = (
+                (camera.clock is Clock.STAMP or len(camera.images) >= LOOKED_AT)
+                and selection.white in (None, 1, WHITE)
+                and all(isinstance(m, ClassMap) and m.shows_road for m in meanings)
+            )
         except LogError as error:
             problem = error.sentence
-        verified = verify or log.size <= SMALL
+            # More labels make their values no clearer, but another problem may vanish with them.
+            is_certain = isinstance(error.__cause__, UnclearLabelsError) or not log.has_camera
+        if log.by_summary and (log.damage or not is_certain):
+            return describe(path, config, by_summary=False)
+        verified = not log.by_summary and (verify or log.size <= SMALL)
         sha256 = log.verify(on_bytes) if verified else None
         return LogDescription(
             path=log.source,
@@ -471,7 +536,9 @@ def describe(
             problem=problem,
             damage=tuple(map(str, log.damage)),
             losses=log.losses,
-            digest=log.digest,
+            digest="" if log.by_summary else log.digest,
             verified=verified,
             sha256=sha256,
+            by_summary=log.by_summary,
+            traffic=path.traffic if isinstance(path, RemoteLog) else None,
         )

@@ -26,8 +26,8 @@ def info(
         roadeval info drive.mcap
 
     Shows the topics with their kind, size, number and rate of messages, gaps and damage; and why
-    replay would pick what it picks, or what it would ask for. If the log has more than 50 MB, only
-    its indexes are read, unless --verify is given.
+    replay would pick what it picks, or what it would ask for. Without --verify only the indexes of
+    a log of more than 50 MB are read, and of one behind a URL its summary and first messages.
     """
     arguments.check_one_camera(options)
     config = arguments.configuration(options)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
-from roadeval.data.words import timestamp
+from roadeval.data.words import counted, timestamp
 from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
@@ -23,9 +23,15 @@ NS = 1_000_000_000
 def show(log: LogDescription, out: Console) -> None:
     """Print what a log holds, and what replay would pick of it."""
     size = f"{log.bytes / 1e6:.1f} MB"
-    unverified = "" if log.verified else "; not read whole, --verify looks for all damage"
+    is_partial = not log.verified and not log.by_summary
+    unverified = "; not read whole, --verify looks for all damage" if is_partial else ""
     length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
     console.say(f"{log.path}: {length}, {size}{unverified}", out)
+    if read := log.traffic:
+        what = " from the log's summary and first messages" if log.by_summary else ""
+        amount = f"{counted(read.requests, 'request')}, {read.bytes / 1e6:.1f} MB"
+        rest = "; --verify checks every chunk" if log.by_summary else ""
+        console.say(f"read{what} in {amount}{rest}", out)
     out.print()
     tables.show_table(_topic_table(log.topics), out)
     for topic in log.topics:

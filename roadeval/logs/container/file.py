@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, Final
 
 import numpy as np
+import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.logs.container.records import (
@@ -48,6 +49,8 @@ class ChannelLog:
     last_ns: int = np.iinfo(np.int64).min
     blocks: list[tuple[int, Entries]] = field(default_factory=list)
     """Chunk numbers and entries in the order of the file; empty if the channel is not wanted."""
+    times_of_chunk: npt.NDArray[np.int64] | None = None
+    """Log times in one chunk, ascending, if not all messages were placed."""
 
     def add(self, chunk: int, entries: Entries) -> None:
         """Add the messages of a chunk."""

@@ -398,6 +398,8 @@ class Summary:
     """The chunks' heads without their checksums, by offset."""
     index_ends: dict[int, int] = field(default_factory=dict)
     """The byte at which a chunk's message indexes end, by the chunk's offset."""
+    maps: dict[int, Buffer] = field(default_factory=dict)
+    """The channels of a chunk and the offsets of their message indexes, packed, likewise."""
     statistics: Statistics | None = None
 
     def fill(self, records: memoryview) -> None:
@@ -430,8 +432,17 @@ class Summary:
             if data_at + data_size == offset + length:
                 chunk = Chunk(offset, start, end, size, 0, name, data_at, data_size)
                 self.chunks[offset], self.index_ends[offset] = chunk, offset + length + indexes
+                self.maps[offset] = body[36 : 36 + map_size]
                 return
         raise BadRecord("a chunk index that does not add up")
+
+    def channels_in(self, offset: int) -> list[int]:
+        """Return the channels of a chunk that has message indexes."""
+        packed = self.maps[offset]
+        if len(packed) % 10:
+            raise BadRecord("a chunk index that does not add up")
+        channels: list[int] = np.frombuffer(packed, "<u2, <u8")["f0"].tolist()
+        return channels
 
 
 def read_summary(source: Bytes) -> Summary:

@@ -25,6 +25,8 @@ from roadeval.logs.settings import NS
 CACHE: Final = 16 << 20
 """Bytes of a topic's small messages in memory. A label's stamp is read long before its picture, and
 its chunk, which holds mostly other topics, is no longer in memory then."""
+ENOUGH: Final = 5
+"""Steps from message to message whose median tells a rate."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
 
@@ -45,7 +47,8 @@ class TopicInfo:
     last_ns: int | None = None
     """Log times of the first and the last message, None if there is none."""
     rate_hz: float | None = None
-    """One over the median time between messages; None below two messages."""
+    """One over the median time between messages; None below two messages. If they were not all
+    placed, it is the median of one chunk, or the mean."""
     gaps: tuple[tuple[int, int], ...] = ()
     """Log times around each step of more than 2.5 median periods, for images only."""
     format: str = ""
@@ -81,7 +84,11 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
     first = min((log.first_ns for log in logs), default=None)
     last = max((log.last_ns for log in logs), default=None)
     times = reader.log_times
-    period = median_period(times)
+    if len(times) < count:
+        times, some = times[:0], logs[0].times_of_chunk
+        period = median_period(some) if some is not None and len(some) > ENOUGH else 0
+    else:
+        period = median_period(times)
     rate = NS / period if period > 0 else None
     # If a topic is not read, only the number of its messages and their time range are known.
     if rate is None and count > 1 and first is not None and last is not None and last > first:

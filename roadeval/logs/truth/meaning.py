@@ -140,6 +140,8 @@ class ClassMap:
     """The names of label values, or packed colours, as far as they are known."""
     codes: ClassCodes | None = None
     """None for plain masks, which have no classes."""
+    shows_road: bool = True
+    """Whether road occurred in plain masks; if not, its value is a guess."""
 
     @property
     def classes(self) -> list[TruthClass]:
@@ -318,7 +320,7 @@ def find_meaning(
             ignored = [str(value) for value in values if truths.get(value) == IGNORE]
             words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored, shown)}"
             words += f"; {NO_LABEL}" if has_negatives else ""
-            return ClassMap(truths, UNKNOWN, False, words)
+            return ClassMap(truths, UNKNOWN, False, words, shows_road=white in values)
     problem = f"{name} holds the values {_listed(map(text_of, values))}"
     raise UnclearLabelsError(problem, remedy=remedy)
 
