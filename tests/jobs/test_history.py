@@ -64,19 +64,28 @@ def test_the_run_that_is_worse_is_named_with_what_changed(made):
 
 
 def test_near_steps_are_one_event_if_runs_are_noisy(made):
-    (change,) = (event.first for event in made.events)
-    for noise, events in ((1e-3, [(4, 2), (7, 1)]), (0, [(4, 1), (6, 1), (7, 1)])):
+    change = made.events[0].first
+    steps = [change.step._replace(run=run) for run in (4, 6, 7)]
+    steps.append(change.step._replace(run=5, kind="outlier"))
+    for noise, events in ((1e-3, [(4, 2), (5, 1), (7, 1)]), (0, [(n, 1) for n in (4, 5, 6, 7)])):
         line = change.line._replace(noise=noise)
-        steps = [change.step._replace(run=run) for run in (4, 6, 7)]
         grouped = group_changes([change._replace(line=line, step=s) for s in steps], "filtered")
         assert [(event.run, len(event.changes)) for event in grouped] == events
 
 
+def test_the_greatest_change_of_all_pixels_of_the_focus_stands_first(made):
+    first = made.events[0].first
+    fall = first._replace(difference=replace(first.difference, mean=-0.5))
+    others = (fall.line._replace(**{name: "x"}) for name in ("variant", "kind", "rate"))
+    changes = [first, fall, *(fall._replace(line=line) for line in others)]
+    (event,) = group_changes(changes, "filtered")
+    assert [change.difference.mean for change in event.changes][:2] == [-0.5, first.difference.mean]
+
+
 def test_results_that_share_a_label_are_one_run(nights):
     made = history(nights, by="build")
-    assert [(run.title, len(run.paths), run.drives) for run in made.runs] == [
-        (f"{build}", 2, 6) for build in range(4)
-    ]
+    runs = [(run.title, len(run.paths), run.drives) for run in made.runs]
+    assert runs == [(f"{build}", 2, 6) for build in range(4)]
     # Of a drive that a run has twice the later result counts.
     assert ([event.run for event in made.events], made.lost) == ([2], [])
 
