@@ -143,7 +143,7 @@ def _details(history: History, event: Event) -> Details:
         frames: Rows = [[drive, str(n), points(change)] for drive, n, change in event.frames]
         title = "Frames that changed most"
         parts.append(Table(["drive", "frame", "change of ERR"], frames, caption=title, small=True))
-    paths = [history.runs[place].paths[0] for place in (event.run - 1, event.run)]
+    paths = [history.runs[place].paths[0] for place in (event.before, event.run)]
     parts.append(blocks.Command(shlex.join(["roadeval", "compare", *paths])))
     return Details(f"{run.name}: {describe_change(first)}", parts)
 

@@ -48,6 +48,8 @@ class Event:
     """The changes of one run, the most telling first."""
 
     run: int
+    before: int
+    """The last scored run before it."""
     changes: list[LineChange]
     reasons: Sequence[str] = ()
     """Differences from the run before, as ``svm.c 1 to 2``."""
@@ -110,7 +112,8 @@ def group_changes(changes: Sequence[LineChange], focus: str) -> list[Event]:
         if event := next((e for e in same_kind if abs(e.run - step.run) <= near), None):
             event.changes.append(change)
         else:
-            events.append(Event(step.run, [change]))
+            before = max(run for run in range(step.run) if defined(float(change.line.rates[run])))
+            events.append(Event(step.run, before, [change]))
     return sorted(events, key=lambda event: event.run)
 
 

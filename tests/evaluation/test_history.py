@@ -18,6 +18,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 
 DRIVES = [*"abcdefgh"]
 RUNS = 12
+KINDS = ("all", "region", "class")
 
 
 def rows_of(change=lambda run, drive: 0.0, runs=RUNS, **columns):
@@ -72,27 +73,26 @@ def test_drives_that_come_and_go_make_no_step_and_the_level_is_that_of_the_last_
     np.testing.assert_allclose(line.levels, line.rates[-1], atol=1e-12)
 
 
-@pytest.mark.parametrize("column", ["truth", "log_digest", "frames", "road", "N"])
+@pytest.mark.parametrize("column", ["camera", "truth", "log_digest", "frames", "road", "N"])
 def test_a_drive_of_other_pixels_begins_anew(column):
     def is_new(run, drive):
         return 2 if run >= 7 and drive == "a" else 1
 
-    lines = lines_of(
-        rows_of(lambda run, drive: 0.3 * (is_new(run, drive) == 2), **{column: is_new})
-    )
-    assert not lines[ERR].steps
-    everywhere = lines_of(
-        rows_of(lambda run, drive: 0.3 * (run >= 7), **{column: lambda run, drive: run >= 7})
-    )
-    assert not everywhere[ERR].steps
+    rows = rows_of(lambda run, drive: 0.3 * (is_new(run, drive) == 2), **{column: is_new})
+    assert not lines_of(rows)[ERR].steps
+    rows = rows_of(lambda run, drive: 0.3 * (run >= 7), **{column: lambda run, drive: run >= 7})
+    assert not lines_of(rows)[ERR].steps
 
 
-def test_a_tag_is_a_line_of_its_drives_alone():
-    lines = lines_of(rows_of(lambda run, drive: 0.02 * (run >= 7 and drive in "abc")))
-    dusk = lines["light", "dusk", "ERR"]
-    assert dusk.drives["drive"].tolist() == ["a", "b", "c"]
+@pytest.mark.parametrize(("tag", "name"), [("light", "light"), *((n, f"tag_{n}") for n in KINDS)])
+def test_a_tag_is_a_line_of_its_drives_alone_whatever_its_name(tag, name):
+    rows = rows_of(lambda run, drive: 0.02 * (run >= 7 and drive in "abc"))
+    rows = rows.rename(columns={"tag_light": f"tag_{tag}"})
+    lines = {line.title: line for line in find_lines(rows, {f"tag_{tag}": tag}, RUNS, 0.95)}
+    assert [*lines] == ["ERR", "FPR", "FNR", f"ERR, {name} dusk"]
+    dusk = lines[f"ERR, {name} dusk"]
+    assert (dusk.kind, dusk.drives["drive"].tolist()) == (name, ["a", "b", "c"])
     (step,) = dusk.steps
-    assert dusk.title == "ERR, light dusk"
     assert (step.run, step.change) == (7, pytest.approx(0.02))
 
 
@@ -108,20 +108,20 @@ def test_a_run_that_stands_out_is_no_part_of_the_level_beside_it():
 
 
 def test_no_level_is_below_zero():
-    def easy_drives_come(run, drive):
-        return math.nan if drive in "fgh" and run < 6 else 0.08 * (drive in "abcde" and run >= 6)
+    def an_easy_drive_stays(run, drive):
+        gone = run < 6 if drive == "a" else run == 11
+        return math.nan if gone else 0.08 * (drive != "a" and run >= 6)
 
-    line = lines_of(rows_of(easy_drives_come, runs=RUNS))[ERR]
-    assert line.levels.min() >= 0
+    line = lines_of(rows_of(an_easy_drive_stays))[ERR]
+    assert (line.levels.min(), len(line.steps)) == (0, 1)
 
 
 def test_drives_of_a_group_count_as_one():
-    def group(run, drive):
-        return "pair" if drive in "ab" else drive
-
-    line = lines_of(rows_of(lambda run, drive: 0.07 * (run >= 7 and drive in "ab"), group=group))[
-        ERR
-    ]
+    columns = {"group": lambda _, drive: "pair" if drive in "ab" else drive}
+    columns["truth"] = lambda run, drive: drive == "c" and run >= 3
+    rows = rows_of(lambda run, drive: 0.07 * (run >= 7 and drive in "ab"), **columns)
+    line = lines_of(rows)[ERR]
+    assert line.rates[0] == pytest.approx((0.02 / 2 + 0.03 / 2 + 0.39) / 7)
     (change,) = find_changes([line], 0.95, no_frames)
     assert change.difference.mean == pytest.approx(0.01)
     assert change.difference.groups == 7
@@ -135,9 +135,8 @@ def judged(rows, *texts, last=5):
 
 def test_the_last_run_is_judged_against_the_mean_of_those_before():
     rows = rows_of(lambda run, drive: 0.004 * (run % 2) + 0.01 * (run == 11))
-    change, level, surely = judged(
-        rows, "post.mine.ERR > +1pp", "post.mine.ERR < 50%", "post.mine.ERR > +1pp surely"
-    )
+    texts = (f"post.mine.ERR {limit}" for limit in ("> +1pp", "< 50%", "> +1pp surely"))
+    change, level, surely = judged(rows, *texts)
     assert change.value == pytest.approx(0.01 + 0.004 * 3 / 5)
     assert change.after == pytest.approx(rows[rows["run"] == 11]["ERR"].mean())
     assert (change.holds, level.holds) == (True, True)
@@ -145,9 +144,8 @@ def test_the_last_run_is_judged_against_the_mean_of_those_before():
     assert not surely.holds
     assert surely.low < change.value - 0.001
     # Runs that are not there make nothing surer.
-    assert judged(rows, surely.condition.text, last=99) == judged(
-        rows, surely.condition.text, last=11
-    )
+    text = surely.condition.text
+    assert judged(rows, text, last=99) == judged(rows, text, last=11)
 
 
 def test_a_condition_on_what_is_not_there_is_not_judged():
@@ -178,16 +176,6 @@ def test_the_only_drive_is_judged_over_its_frames_of_the_runs_that_count():
     line = lines_of(rows_of(added))[ERR]
     _, step = find_changes([line], 0.95, within)
     assert asked == [(["a"], [0, 2, 3], [4]), (["a"], [0, 2, 3, 5, 6], [7, 8, 9, 10, 11])]
-    # Without its frames there is no interval.
-    nothing = replace(step.difference, mean=math.nan)
-    _, step = find_changes([line], 0.95, lambda *_: nothing)
+    gone = replace(step.difference, mean=math.nan)  # of frames
+    _, step = find_changes([line], 0.95, lambda *_: gone)
     assert (step.difference.mean, step.difference.low) == (pytest.approx(0.02), None)
-
-
-@pytest.mark.parametrize("tag", ["all", "region", "class"])
-def test_a_tag_that_is_called_as_a_kind_of_pixels_is_no_such_kind(tag):
-    column = f"tag_{tag}"
-    lines = find_lines(rows_of().assign(**{column: "all"}), {column: tag}, RUNS, 0.95)
-    titles = {line.title: (line.kind, line.part) for line in lines}
-    assert [*titles] == ["ERR", "FPR", "FNR", f"ERR, {column} all"]
-    assert titles[f"ERR, {column} all"] == (column, "all")

@@ -37,10 +37,8 @@ def test_totals_sum_counts_average_rates_and_count_the_undefined():
     assert row["ERR"] == (1 / 5 + 4 / 8) / 2
     assert row["pooled_ERR"] == 5 / 13
     assert row["TPR"] == 0.75  # the second frame has no road
-    assert {n for n in row if n.startswith("undefined_") and row[n]} == {
-        "undefined_TPR",
-        "undefined_FNR",
-    }
+    undefined = {name for name in row if name.startswith("undefined_") and row[name]}
+    assert undefined == {"undefined_TPR", "undefined_FNR"}
 
 
 @pytest.mark.parametrize(
@@ -71,11 +69,8 @@ def test_variants_that_look_like_numbers_keep_their_names_and_order():
     errors = {("10", "post"): [1], ("2", "post"): [3], ("nan", "post"): [5]}
     sums = tables.totals(a_table(errors))
     trees = tables.as_trees(sums)
-    assert [(name, own["post"]["ERR"]) for name, own in trees.items()] == [
-        ("10", 0.01),
-        ("2", 0.03),
-        ("nan", 0.05),
-    ]
+    rates = [(name, tree["post"]["ERR"]) for name, tree in trees.items()]
+    assert rates == [("10", 0.01), ("2", 0.03), ("nan", 0.05)]
     assert tables.masks_of(a_table(errors)) == [*errors]
 
 
@@ -89,9 +84,8 @@ def test_each_camera_counts_the_same_in_the_mean_of_a_rig():
 def test_nothing_evaluated_is_nothing_in_every_table():
     assert tables.as_trees(tables.totals(NOTHING)) == {}
     assert len(tables.windows(NOTHING, 10)) == 0
-    assert [*tables.windows(NOTHING, 10)][:5] == [
-        *("drive", "camera", "window", "first_frame", "last_frame")
-    ]
+    names = ["drive", "camera", "window", "first_frame", "last_frame"]
+    assert [*tables.windows(NOTHING, 10)][:5] == names
     assert tables.masks_of(NOTHING) == []
     assert tables.is_final(NOTHING).shape == (0,)
     assert len(tables.finals(NOTHING)) == len(tables.worst(NOTHING, 5)) == 0
@@ -133,10 +127,8 @@ def test_each_camera_and_each_drive_is_cut_by_itself():
     parts = [a_table({POST: [10] * 3}), a_table({POST: [20] * 3}, camera="/rear")]
     parts += [a_table({POST: [30] * 2}, drive="road")]
     rows = tables.windows(tables.concatenate(parts), 2)
-    found = {
-        key: own["frames"].tolist() for key, own in tables.group_rows(rows, ["drive", "camera"])
-    }
-    assert [*found.values()] == [[2, 1], [2, 1], [2]]
+    groups = tables.group_rows(rows, ["drive", "camera"])
+    assert [group["frames"].tolist() for _, group in groups] == [[2, 1], [2, 1], [2]]
 
 
 def test_windows_go_by_window_and_then_by_mask_in_the_variants_order():

@@ -14,8 +14,8 @@ from roadeval.jobs.results.history import find_results, history, write
 from roadeval.jobs.results.result import Result
 from roadeval.report.blocks import Figure
 from roadeval.report.history import document
-from roadeval.results.history import verdict
-from roadeval.results.tables import read_parquet, write_parquet
+from roadeval.results.history import group_changes, verdict
+from roadeval.results.tables import read_parquet, read_table, write_parquet
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
 DAY = 86_400
@@ -55,6 +55,7 @@ def test_the_run_that_is_worse_is_named_with_what_changed(made):
     (event,) = made.events
     assert event.run == 5
     line = event.first.line
+    assert {len(part.drives) for part in made.lines if part.kind == "weather"} == {2}
     assert (line.variant, line.stage, line.kind, line.rate) == ("filtered", "post", "all", "ERR")
     assert sorted(event.first.drives["drive"][:2]) == ["drive_0000-00000000", "drive_0003-00000003"]
     assert event.reasons == ["commit 444444444444 to 555555555555", "svm.C 1 to 2"]
@@ -86,35 +87,31 @@ def test_drives_and_fleets_are_read_in_batches_with_the_rates_that_their_tables_
     assert np.isfinite(everywhere.drive_rates).sum(axis=1).tolist() == [6] * 8 + [1]
 
 
-def test_a_class_is_a_line_by_its_name_or_its_number(nights, tmp_path):
-    folder = copy_sums(nights, tmp_path / "nights")
-    rows = read_parquet([folder / "0" / "drives.parquet"], "drives")[["drive", "camera"]]
-    rows = rows.assign(variant="filtered", beside=0, frames=20, worst="")
-    pavement = rows.assign(**{"class": 4, "name": "pavement"}, truth="other", pixels=100, road=7)
-    unnamed = rows.assign(**{"class": 11, "name": ""}, truth="road", pixels=50, road=40)
-    for night in (*range(3), *range(4, 8)):
-        table = pd.concat([pavement, unnamed])
-        write_parquet({folder / f"{night}" / "classes.parquet": ("classes", table)})
-    (folder / "3" / "classes.parquet").unlink(missing_ok=True)
-    made = history(folder)
-    assert not made.lost
-    of_classes = {line.part: line.rates for line in made.lines if line.kind == "class"}
-    assert [*of_classes] == ["pavement", "class 11"]
-    there = np.arange(8) != 3
-    np.testing.assert_allclose(of_classes["pavement"][there], 0.07)
-    np.testing.assert_allclose(of_classes["class 11"][there], 0.2)
-    assert np.isnan(of_classes["pavement"][3])
+def test_near_steps_are_one_event_if_runs_are_noisy(made):
+    change = made.events[0].first
+    steps = [change.step._replace(run=run) for run in (4, 6, 7)]
+    steps.append(change.step._replace(run=5, kind="outlier"))
+    for noise, events in ((1e-3, [(4, 2), (5, 1), (7, 1)]), (0, [(n, 1) for n in (4, 5, 6, 7)])):
+        line = change.line._replace(noise=noise)
+        grouped = group_changes([change._replace(line=line, step=s) for s in steps], "filtered")
+        assert [(event.run, len(event.changes)) for event in grouped] == events
+
+
+def test_the_greatest_change_of_all_pixels_of_the_focus_stands_first(made):
+    first = made.events[0].first
+    fall = first._replace(difference=replace(first.difference, mean=-0.5))
+    others = (fall.line._replace(**{name: "x"}) for name in ("variant", "kind", "rate"))
+    changes = [first, fall, *(fall._replace(line=line) for line in others)]
+    (event,) = group_changes(changes, "filtered")
+    assert [change.difference.mean for change in event.changes][:2] == [-0.5, first.difference.mean]
 
 
 def test_results_that_share_a_label_are_one_run(nights):
     made = history(nights, by="build")
-    assert [(run.title, len(run.paths), run.drives) for run in made.runs] == [
-        (f"{build}", 2, 6) for build in range(4)
-    ]
+    runs = [(run.title, len(run.paths), run.drives) for run in made.runs]
+    assert runs == [(f"{build}", 2, 6) for build in range(4)]
     # Of a drive that a run has twice the later result counts.
-    assert [event.run for event in made.events] == [2]
-    assert made.lost == []
-    assert [line.title for line in made.lines] == [line.title for line in history(nights).lines]
+    assert ([event.run for event in made.events], made.lost) == ([2], [])
 
 
 def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path):
@@ -122,27 +119,46 @@ def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path)
     old = folder / "2" / "fleet.json"
     old.write_text(old.read_text().replace('"version": 3', '"version": 2', 1))
     (folder / "3" / "scores.parquet").write_bytes(b"PAR1")
+    (folder / "4" / "drives.parquet").unlink()
     made = history(folder)
-    assert [run.drives for run in made.runs] == [6, 6, 0, 6, 6, 6, 6]
-    assert [event.run for event in made.events] == [4]
-    assert len(made.lost) == 2
+    assert [run.drives for run in made.runs] == [6, 6, 0, 0, 6, 6, 6]
+    (event,) = made.events
+    assert (event.run, event.before) == (4, 1)
+    assert event.reasons[0] == "commit 111111111111 to 555555555555"
+    assert len(made.lost) == 3
     assert "whose format is no longer read" in made.lost[0]
     assert "scores.parquet: damaged" in made.lost[1]
 
 
-def test_many_results_are_read_in_parts_and_results_of_a_drive_as_a_fleet(
-    nights, made, monkeypatch
-):
-    monkeypatch.setattr("roadeval.jobs.results.history.BATCH", 3)
+def test_results_are_read_in_parts_and_those_of_a_drive_as_fleets(nights, made, monkeypatch):
+    monkeypatch.setattr("roadeval.jobs.results.history.BATCH", 2)
     for line, other in zip(made.lines, history(nights).lines, strict=True):
         np.testing.assert_array_equal(line.drive_rates, other.drive_rates)
-    name = "drive_0003-00000003"
-    first, worse = (find_results(nights / f"{night}" / "results" / name) for night in (0, 5))
-    of_drive = history([*first, nights / "1", *worse])
-    (column,) = np.flatnonzero(made.lines[0].drives["drive"] == name)
+    folders = [nights / f"{night}" / "results" / "drive_0003-00000003" for night in (0, 5)]
+    of_drive = history([nights / "1", *folders])
     (line,) = (line for line in of_drive.lines if line[:5] == made.lines[0][:5])
-    rates = line.drive_rates[1:, line.drives["drive"] == "drive_0003"].ravel()
-    np.testing.assert_array_equal(rates, made.lines[0].drive_rates[[0, 5], column])
+    is_drive = made.lines[0].drives["drive"] == folders[0].name
+    rates = line.drive_rates[1:, line.drives["drive"] == "drive_0003"]
+    np.testing.assert_array_equal(rates, made.lines[0].drive_rates[[0, 5]][:, is_drive])
+
+
+def test_pixels_of_classes_are_lines_beside_those_of_regions(nights, tmp_path):
+    folder, names = copy_sums(nights, tmp_path / "nights"), read_table("classes", "").columns
+    rows = [("filtered", 1, "lit", "other", 2), ("filtered", 2, "street", "road", 6)]
+    rows += [("filtered", n, "", "other", n) for n in (7, 8)] + [("blind", *rows[0][1:])]
+    columns = ["variant", "class", "name", "truth", "road"]
+    table = pd.DataFrame([*rows, ("filtered", 3, "sky", "ignored", 5)], columns=columns)
+    table = table.assign(drive="drive_0000-00000000", camera="/camera/image", pixels=10)
+    for night in range(8):
+        path = folder / f"{night}" / "classes.parquet"
+        write_parquet({path: ("classes", table.reindex(columns=names, fill_value=1))})
+    path.unlink()
+    made = history(folder)
+    classes = {line.part: line.rates[0] for line in made.lines if line.kind == "class"}
+    assert classes == pytest.approx({"lit": 0.2, "street": 0.4, "class 7": 0.7, "class 8": 0.8})
+    assert made.lost == []
+    assert {line.variant for line in made.lines} == {"filtered", "unfiltered"}
+    assert len(history(folder, by="build").lines) == len(made.lines)
 
 
 def test_two_logs_of_one_name_in_a_run_are_told(nights, tmp_path):

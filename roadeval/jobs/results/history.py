@@ -57,7 +57,6 @@ DRIVES: Final = 3
 """Frames that are named of an event, and drives in which they are searched."""
 NEAR: Final = 10
 """Runs on both sides of a step whose frames are compared, if there is one drive."""
-UNKNOWN: Final = "nothing that the results know of"
 BATCH: Final = 30
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
@@ -113,9 +112,8 @@ def history(
             drives[path] = result
     runs = _runs_in_order(origins, by, lost)
     if len(runs) < 2:
-        remedy = lost[0] if lost else ""
         problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
-        raise RoadevalError(problem, remedy=remedy)
+        raise RoadevalError(problem, remedy=next(iter(lost), ""))
     run_of = np.array([n for n, run in enumerate(runs) for _ in run.paths])
     paths = [Path(path) for run in runs for path in run.paths]
     rows = _read_rows(paths, drives, lost, on_progress)
@@ -136,7 +134,7 @@ def history(
     read = lru_cache(4 * NEAR)(partial(_read_frames, runs))
     within = partial(_within_drive, read, settings)
     events = [
-        replace(event, reasons=[*_reasons(runs, event)] or [UNKNOWN])
+        replace(event, reasons=[*_reasons(runs, event)] or ["nothing that the results know of"])
         for event in group_changes(search.find_changes(lines, settings.confidence, within), focus)
     ]
     for event in events[-DETAILED:]:
@@ -207,9 +205,8 @@ def _origin(result: Result, path: Path) -> Origin:
     """Return how a result was made; its time is that of its file if it does not say."""
     origin = result.facts.origin or Origin()
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
-    made_ns = origin.made_ns or file.stat().st_mtime_ns
+    made_ns = min(max(origin.made_ns or file.stat().st_mtime_ns, 0), 2**63 - 1)
     labels = {visible(name): visible(text) for name, text in origin.labels.items()}
-    made_ns = min(max(made_ns, 0), 2**63 - 1)  # others are no times
     return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
 
 
@@ -316,7 +313,7 @@ def _changed_frames(read: ReadFrames, event: Event) -> Iterator[tuple[str, int, 
     """Yield drive, number and change of the frames that changed most from the run before."""
     line, worse = event.first.line, event.first.difference.mean > 0
     for drive in event.first.drives[KEY].head(DRIVES).itertuples(index=False, name=None):
-        sides = (only(read(run, drive), variant=line.variant) for run in (event.run - 1, event.run))
+        sides = (only(read(run, drive), variant=line.variant) for run in (event.before, event.run))
         pairs = common_masks(*sides)
         pairs = pairs.assign(change=pairs[TESTED] - pairs[f"{TESTED}_base"])
         rows = most_changed_frames(pairs, FRAMES, harmed=worse)
@@ -326,15 +323,16 @@ def _changed_frames(read: ReadFrames, event: Event) -> Iterator[tuple[str, int, 
 def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
     """Yield what differs between the run of an event, or the end of a drift, and the one before."""
     step, line = event.first.step, event.first.line
-    places = event.run - 1, step.after if step.kind == "drift" else event.run
+    places = event.before, step.after if step.kind == "drift" else event.run
     old, new = (runs[place] for place in places)
     before, after = Result(*old.paths), Result(*new.paths)
     parts: dict[str, tuple[Any, Any]] = {
         "commit": (old.origin.commit[:12], new.origin.commit[:12]),
         "uncommitted changes": (old.origin.dirty, new.origin.dirty),
     }
-    drives = {drive.key: drive for drive in before.compared}
-    parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
+    with suppress(RoadevalError):  # one of several results may be damaged
+        drives = {drive.key: drive for drive in before.compared}
+        parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
     named = [
         {f"label {name}": value for name, value in run.origin.labels.items()}
         | (facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version})
@@ -360,9 +358,8 @@ def write(history: History, path: Path) -> Path:
     A `RoadevalError` if the ending is another, or the file cannot be written.
     """
     return write_document(
-        *(path, "a history", lambda: document(history)),
-        lambda: markdown(history),
-        lambda: as_json(history),
+        *(path, "a history", partial(document, history)),
+        *(partial(markdown, history), partial(as_json, history)),
     )
 
 
