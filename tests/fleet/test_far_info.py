@@ -125,6 +125,14 @@ def test_damage_where_the_first_messages_lie_is_told(server, tmp_path):
     assert far.losses
 
 
+def test_a_description_that_is_another_one_in_the_first_chunk_is_told(server, tmp_path):
+    path = demo_log(tmp_path / "drive.mcap", chunk_size=1 << 20, compression=CompressionType.NONE)
+    path.write_bytes(path.read_bytes().replace(b"foxglove.Comp", b"foxglove.Camp", 1))
+    far, lines = shown(server.url("drive.mcap"))
+    assert (far.by_summary, lines) == (False, shown(path)[1])
+    assert far.losses
+
+
 @pytest.mark.parametrize("left", [-1, 0.5])
 def test_a_log_without_a_summary_is_read_as_on_a_disk(server, tmp_path, left):
     path = demo_log(tmp_path / "drive.mcap")
@@ -252,6 +260,15 @@ def test_masks_that_show_no_road_at_first_are_read_farther(server, tmp_path):
     far, lines = shown(server.url("drive.mcap"))
     assert (far.by_summary, lines) == (False, shown(path)[1])
     assert any("a mask of 0 1: road is 1" in line for line in lines)
+
+
+def test_a_rate_is_that_of_most_frames_although_some_are_missing(server, tmp_path):
+    times = [START + number * PERIOD for number in range(400) if not 100 < number < 300]
+    messages = [("/camera", time, compressed(time, jpeg(grey(90)))) for time in times]
+    ros2_log(tmp_path / "drive.mcap", messages, chunk_size=1 << 13)
+    (far,) = roadeval.info(server.url("drive.mcap")).topics
+    assert (far.count, far.rate_hz) == (len(times), 10)
+    assert (far.first_ns, far.last_ns) == (times[0], times[-1])
 
 
 def test_values_that_nobody_named_are_told_by_the_first_messages(server, tmp_path):
