@@ -7,7 +7,8 @@
 #   FAIL_IF   conditions of compare, one a line
 #   BASELINE  the last good result, its URL, or a folder of runs; .roadeval/base by default. None
 #             yet: passes
-#   KEEP      1: a result that passed becomes the baseline, or one more run of the folder
+#   KEEP      1: a result that passed becomes the baseline, or one more run of the folder; one at a
+#             URL stays
 #   NAME      name of the check; each has its comment
 #   TOKEN     token that writes the comment; without one there is none
 #
@@ -53,7 +54,7 @@ fi
   printf '## roadeval: failed, %s\n\n' "$what"
   tail -n 20 .roadeval/errors.txt | cut -c 1-1000 | sed 's/^/    /'
 } > .roadeval/comment.md
-if [ "$code" = 0 ] && [ "${KEEP:-}" = 1 ]; then
+if [ "$code" = 0 ] && [ "${KEEP:-}" = 1 ] && [ "${base#*://}" = "$base" ]; then
   # A folder of runs has one more.
   [ ! -d "$base" ] || [ -e "$base/summary.json" ] || [ -e "$base/fleet.json" ] ||
     base=$base/$(date +%s)
