@@ -479,7 +479,7 @@ class LogDescription:
     """Whether only the summary and the first messages were read: damage, gaps, and values of labels
     that occur later are unknown then."""
     traffic: Traffic | None = None
-    """What was read of a log that lies elsewhere."""
+    """The requests and bytes that a log elsewhere has cost so far; None for one on a disk."""
     misfits: tuple[str, ...] = ()
     """How truth that lies beside the log does not fit its images, a sentence each."""
 

@@ -37,7 +37,7 @@ FEW: Final = 100
 """Messages of which the first does not do, such as static transforms, that are read at most."""
 
 
-class Outline(Scan):
+class SummaryScan(Scan):
     """The beginnings of the chunks that hold the first messages of the topics to be read.
 
     A `BadRecord` if the summary lacks something, or contradicts what is read of the chunks.
@@ -167,7 +167,7 @@ def outline_of(
     that their first chunk holds. Damage elsewhere is not noticed.
     """
     with suppress(BadRecord):
-        outline = Outline(FileBytes(file), stamp_of, wanted, several)
+        outline = SummaryScan(FileBytes(file), stamp_of, wanted, several)
         container = Container(path, outline, wanted)
         for channel_id, total in outline.totals.items():
             read = container.logs.get(channel_id)
