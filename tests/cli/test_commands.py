@@ -4,14 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval import RunConfig, configure
+from roadeval import Outcome, Progress, RunConfig, configure
 from roadeval.cli.app import main
 from roadeval.cli.options import OPTIONS, with_flags
-from roadeval.jobs.progress import Progress
-from roadeval.jobs.run.replay import Outcome
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.facts import DriveFacts, FrameAccount
 from roadeval.runtime.sentence import Sentence, Setting
+from tests.fixtures.logged import jpeg, write_drive
 from tests.fixtures.make import make
 from tests.jobs.making import write_log
 from tests.results.making import facts_of
@@ -102,17 +100,13 @@ def write(tmp_path):
     """Write a log of 1 Hz with these topics; masks where a topic's values are given."""
 
     def write(topics, seconds=range(4)):
-        with LogWriter(tmp_path / "drive.mcap") as log:
-            for second in seconds:
-                for topic, values in topics.items():
-                    image = np.resize(np.array(values or [120], np.uint8), (6, 8))
-                    stamp = START + second * SECOND
-                    if values:
-                        log.mask(topic, stamp, image)
-                    else:
-                        jpeg = cv2.imencode(".jpg", image)[1].tobytes()
-                        log.image(topic, stamp, jpeg, "jpeg")
-        return str(tmp_path / "drive.mcap")
+        grey = np.full((6, 8), 120, np.uint8)
+        messages = {
+            topic: np.resize(np.uint8(values), (6, 8)) if values else jpeg(grey)
+            for topic, values in topics.items()
+        }
+        stamps = (START + second * SECOND for second in seconds)
+        return str(write_drive(tmp_path / "drive.mcap", ((stamp, messages) for stamp in stamps)))
 
     return write
 

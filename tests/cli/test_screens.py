@@ -10,12 +10,11 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress as Display
 
+from roadeval import Outcome, Progress
 from roadeval.cli import console, messages, progress
 from roadeval.cli.screens import fleet, tables
 from roadeval.cli.screens import replay as outcome
 from roadeval.evaluation.score.scoreboard import Effect
-from roadeval.jobs.progress import Progress
-from roadeval.jobs.run.replay import Outcome
 from roadeval.report.blocks import Table
 from roadeval.results.facts import (
     DriveFacts,

@@ -13,8 +13,7 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval import compare, replay, replay_fleet
-from roadeval.errors import RoadevalError
+from roadeval import RoadevalError, compare, replay, replay_fleet
 from roadeval.pipeline import stages
 from roadeval.results.fleet import FleetFolder, cached_path
 from tests.e2e.test_fleet import Here

@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval import RoadevalError
-from roadeval.config.run import load_config
+from roadeval import RoadevalError, load_config
 from roadeval.jobs.run import prepared
 from roadeval.jobs.run import replay as replaying
 from roadeval.logs.log import open_log

@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 import pytest
 
-from roadeval.errors import RoadevalError
+from roadeval import RoadevalError
 from roadeval.evaluation import regions
 from roadeval.evaluation.region import Region
 from roadeval.runtime import discovery

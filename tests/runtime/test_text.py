@@ -2,12 +2,14 @@
 
 import json
 import time
+from dataclasses import dataclass
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from roadeval.runtime.documents import LONGEST, read_bounded, read_json, read_toml, read_yaml
+from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import UNENCODABLE, as_markdown, visible, visible_lines, without_secrets
 
 ANYTHING = st.text(st.characters(codec=None))
@@ -155,3 +157,45 @@ def test_yaml_whose_values_are_not_of_their_tags_is_damaged(tmp_path, text):
     (tmp_path / "camera.yaml").write_text(text)
     with pytest.raises(ValueError, match="it is damaged"):
         read_yaml(tmp_path / "camera.yaml")
+
+
+# --- The meaning of settings, as help texts and documented configurations show it -----------------
+
+
+@dataclass
+class Base:
+    """Settings of a base.
+
+    least: The least
+        number.
+    note: This is no field, and so no setting.
+    """
+
+    least: int = 1
+
+
+@dataclass
+class More(Base):
+    """More settings.
+
+    greatest: A number: ``least`` or more.
+    """
+
+    greatest: int = 2
+    undescribed: int = 3
+
+
+def test_the_docstring_of_a_class_and_of_its_bases_describes_their_fields():
+    assert meanings(More) == {
+        "least": "The least number.",
+        "greatest": "A number: ``least`` or more.",
+    }
+
+
+def test_a_class_whose_source_is_nowhere_has_the_same_meanings():
+    made = type(
+        "Made",
+        (More,),
+        {"__doc__": "Made.\n\n    seed: A seed.\n", "__annotations__": {"seed": int}},
+    )
+    assert meanings(made) == {**meanings(More), "seed": "A seed."}

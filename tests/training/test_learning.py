@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roadeval.config.run import configure
+from roadeval import RoadevalError, configure, save_model
 from roadeval.data import NON_ROAD, ROAD, Frame, Role
-from roadeval.errors import RoadevalError
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import View
 from roadeval.training import learning
@@ -23,7 +22,6 @@ from roadeval.training.learning import (
     patch_truth,
     sample,
 )
-from roadeval.training.model import save_model
 from roadeval.training.settings import TrainingSettings
 from tests.training.making import frame, pipelines
 

@@ -11,10 +11,8 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 import pytest
 
-from roadeval.config.run import configure
-from roadeval.errors import RoadevalError
+from roadeval import Model, RoadevalError, configure, load_model, save_model
 from roadeval.training.learning import fit, from_file
-from roadeval.training.model import Model, load_model, save_model
 from roadeval.training.settings import TrainingSettings
 from tests.training.making import frame, pipelines
 
