@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from threading import Timer
+from unittest.mock import Mock
 
 import pytest
 import typer
@@ -178,7 +179,7 @@ def test_help_has_the_width_of_the_terminal(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     assert 140 < max(map(len, help_lines("replay", capsys))) <= 160
     monkeypatch.delenv("COLUMNS")
-    monkeypatch.setattr("sys.__stdout__", None)
+    monkeypatch.setattr("os.get_terminal_size", Mock(side_effect=OSError))
     assert max(map(len, help_lines("replay", capsys))) <= 80
 
 

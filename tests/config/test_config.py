@@ -68,6 +68,10 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = [3, -1]",
             r"net\.road: item 2 must be at least 0",
         ),
+        (
+            "[frames]\ndisturb = ['fogg:2']",
+            r"no disturbance 'fogg'; did you mean fog\? choose dark",
+        ),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
         (
             "[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5",
@@ -93,9 +97,37 @@ def test_a_bad_key_or_value_is_named(tmp_path, text, message):
     assert "\n" not in str(caught.value)
 
 
-def test_without_a_file_a_setting_is_named_by_table_and_key():
-    with pytest.raises(ConfigError, match=r"^`frames\.every`: must be at least 1 \(given: 0\)$"):
-        configure({"frames": {"every": 0}})
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        # Without a file a setting is named by table and key.
+        ({"frames": {"every": 0}}, r"^`frames\.every`: must be at least 1 \(given: 0\)$"),
+        ({"training": {"model": "a\0b"}}, "zero byte"),
+        ({"output": {"save": "\0"}}, "zero byte"),
+        ({"masks": {"m": {"path": "a\0"}}}, "zero byte|must name a log"),
+        *(({"variants": {name: {}}}, "reserved") for name in sorted(RESERVED)),
+        *(
+            ({"variants": {name: {}}}, "letters, digits")
+            for name in ("a/b", "", "ä", "a b", "-", "../x")
+        ),
+        (
+            {"masks": {"net": {"path": "a", "thresold": 1}}},
+            r"there is no such setting; did you mean threshold\? choose decide, first",
+        ),
+        ({"masks": {"net": {"path": "a", "threshold": 2}}}, "must be at most 1"),
+        (
+            {"masks": {"net": {"path": "a", "threshold": 0.5, "labels": {"road": [3]}}}},
+            "threshold is for confidence",
+        ),
+        (
+            {"masks": {"net": {"path": "a", "images": "b", "first": 1}}},
+            "with images labels are paired by name",
+        ),
+    ],
+)
+def test_what_cannot_be_set_is_refused(tables, message):
+    with pytest.raises(ConfigError, match=message):
+        configure(tables)
 
 
 @pytest.mark.parametrize(
@@ -121,31 +153,6 @@ def test_a_chain_without_a_mask_cannot_run(chain):
     own = {"variants": {"own": {"chain": chain}}}
     with pytest.raises(ConfigError, match=f"variant own: .*{wrong}"):
         configure(own).resolved()
-
-
-@pytest.mark.parametrize(
-    "tables",
-    [
-        {"training": {"model": "a\0b"}},
-        {"output": {"save": "\0"}},
-        {"masks": {"m": {"path": "a\0"}}},
-    ],
-)
-def test_a_path_with_a_zero_byte_is_refused(tables):
-    with pytest.raises(ConfigError, match=r"zero byte|must name a log"):
-        configure(tables)
-
-
-@pytest.mark.parametrize("name", sorted(RESERVED))
-def test_reserved_names_are_refused(name):
-    with pytest.raises(ConfigError, match="reserved"):
-        configure({"variants": {name: {}}})
-
-
-@pytest.mark.parametrize("name", ["a/b", "", "ä", "a b", "-", "../x"])
-def test_names_that_are_no_plain_word_are_refused(name):
-    with pytest.raises(ConfigError, match="letters, digits"):
-        configure({"variants": {name: {}}})
 
 
 def test_no_stage_is_called_like_a_table_of_the_run():
@@ -182,29 +189,9 @@ def test_masks_are_those_of_the_drive():
     assert (masks.path, masks.threshold) == ("elsewhere", 0.4)
 
 
-def test_what_holds_for_the_whole_run_is_refused_of_a_drive():
+def test_what_is_no_drive_s_and_masks_that_lie_nowhere_are_refused_of_a_drive():
     with pytest.raises(ConfigError, match=r"\[training\] is no table here; choose frames, ground,"):
         configure().of_drive({"training": {}})
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            {"path": "a", "thresold": 1},
-            r"there is no such setting; did you mean threshold\? choose decide, first",
-        ),
-        ({"path": "a", "threshold": 2}, "must be at most 1"),
-        ({"path": "a", "threshold": 0.5, "labels": {"road": [3]}}, "threshold is for confidence"),
-        ({"path": "a", "images": "b", "first": 1}, "with images labels are paired by name"),
-    ],
-)
-def test_bad_masks_are_named(table, message):
-    with pytest.raises(ConfigError, match=message):
-        configure({"masks": {"net": table}})
-
-
-def test_masks_without_a_path_are_refused_with_the_drive():
     with pytest.raises(ConfigError, match=r"\[masks.net\] has no path"):
         configure({"masks": {"net": {"threshold": 0.5}}}).for_drive("a.mcap")
 
@@ -294,18 +281,14 @@ def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tm
     assert load_config(tmp_path / "run.toml") == config
 
 
-@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
-def test_a_tuned_network_reads_back_from_the_file_of_a_run(write, tmp_path):
-    (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = [1, 3]\n')
-    config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
-    config = config.with_tuned(["mine"])
-    (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
-    assert load_config(tmp_path / "run.toml") == config
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_every_preset_reads_back_from_its_file(preset, tmp_path):
-    config = configure({"preset": preset})
+@pytest.mark.parametrize("preset", [*PRESETS, "tuned"])
+def test_every_preset_and_a_tuned_network_read_back_from_the_file_of_a_run(preset, tmp_path):
+    if preset == "tuned":
+        (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = [1, 3]\n')
+        config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
+        config = config.with_tuned(["mine"])
+    else:
+        config = configure({"preset": preset})
     for text in (run_toml(config, "d", "1"), config_toml(config)):
         (tmp_path / "run.toml").write_text(text)
         assert load_config(tmp_path / "run.toml") == config

@@ -38,16 +38,23 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     )
 
 
-def test_different_drives_are_not_compared():
-    sides = [a_side("a", [10] * 20), a_side("b", [30] * 20, digest="d2")]
-    with pytest.raises(ComparisonError, match="a and b are of different drives"):
-        compare(sides, SETTINGS)
+LATE = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
+EMPTY = a_result("empty", a_drive({POST: []}))
 
 
-def test_a_result_that_does_not_know_its_log_is_not_compared():
-    sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
-    with pytest.raises(ComparisonError, match="b does not say which log it is of"):
-        compare(sides, SETTINGS)
+@pytest.mark.parametrize(
+    ("base", "new", "why"),
+    [
+        (a_side("a", [10]), a_side("b", [30], digest="d2"), "a and b are of different drives"),
+        (a_side("a", [10]), a_side("b", [10], digest=None), "b does not say which log it is of"),
+        (a_side("base", [10, 20]), LATE, "no evaluated frame and stage in common"),
+        (EMPTY, a_side("there", [10] * 12), "empty: nothing was scored"),
+        (a_side("there", [10] * 12), EMPTY, "empty: nothing was scored"),
+    ],
+)
+def test_results_without_a_frame_in_common_are_not_compared(base, new, why):
+    with pytest.raises(ComparisonError, match=why):
+        compare([base, new], SETTINGS)
 
 
 def test_settings_that_differ_are_named_with_both_values():
@@ -70,27 +77,24 @@ def test_settings_that_differ_are_named_with_both_values():
     )
 
 
-def test_a_change_between_scales_is_not_judged_but_a_level_is():
+@pytest.mark.parametrize(
+    ("scale", "other_truths", "reason"),
+    [
+        (0.5, 0, "base and new were replayed with `frames.scale` 1 and"),
+        (1.0, 2, "the truth differs on 2 frames"),
+    ],
+)
+def test_a_change_between_scales_or_truths_is_not_judged_but_a_level_is(
+    scale, other_truths, reason
+):
     base = a_side("base", [10] * 12, settings={"frames.scale": 1.0})
-    found = compare([base, a_side("new", [12] * 12, settings={"frames.scale": 0.5})], SETTINGS)
+    new = a_side("new", [12] * 12, settings={"frames.scale": scale})
+    new = altered(new, truth=lambda t: t + (np.arange(12) >= 12 - other_truths))
+    found = compare([base, new], SETTINGS)
     why = unjudged(found, "post.filtered.ERR > 1pp")
-    assert "not judged in new, because base and new were replayed with `frames.scale` 1 and" in why
+    assert f"not judged in new, because {reason}" in why
     (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)
     assert judged.holds
-
-
-def test_a_change_between_truths_is_not_judged_but_a_level_is():
-    base, new = a_side("base", [10] * 12), a_side("new", [12] * 12)
-    found = compare([base, altered(new, truth=lambda t: t + (np.arange(12) > 9))], SETTINGS)
-    assert "because the truth differs on 2 frames" in unjudged(found, "post.filtered.ERR > 1pp")
-    (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)
-    assert judged.holds
-
-
-def test_nothing_in_common_is_an_error():
-    late = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
-    with pytest.raises(ComparisonError, match="no evaluated frame and stage in common"):
-        compare([a_side("base", [10, 20]), late], SETTINGS)
 
 
 def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_same():
@@ -390,11 +394,3 @@ def test_several_cameras_of_a_drive_are_matched_each_with_its_own():
     assert (change.drives, change.frames) == (2, 24)
     assert change.difference["ERR"].mean == pytest.approx(0.02)
     assert change.difference["ERR"].unit == "frames"
-
-
-@pytest.mark.parametrize("place", [0, 1])
-def test_a_result_without_a_scored_frame_is_not_compared(place):
-    sides = [a_side("there", [10] * 12)]
-    sides.insert(place, a_result("empty", a_drive({POST: []})))
-    with pytest.raises(ComparisonError, match="empty: nothing was scored"):
-        compare(sides, SETTINGS)

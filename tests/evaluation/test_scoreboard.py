@@ -167,23 +167,14 @@ def claims(**masks):
     return {name: tuple(counted.values()) for name, counted in found.items()}
 
 
-def test_full_windows_and_shorter_ones_are_counted_apart():
+def test_claims_are_counted_apart_in_full_windows_and_shorter_ones():
     """Held and in all, of full windows and then of shorter ones."""
     found = claims(filtered_post=[0.1, 0.3, 0.1, 0.1], unfiltered_post=[0.2] * 4)
     assert found["filter_ERR"] == (2, 3, 1, 1)
-
-
-def test_equal_rates_do_not_bear_a_claim_out_and_undefined_ones_are_in_no_count():
-    found = claims(filtered_post=[0.1, 0.2, math.nan], unfiltered_post=[0.2] * 3)
-    assert found["filter_FNR"] == (1, 2, 0, 0)
-
-
-def test_stages_are_held_against_those_before_them():
-    found = claims(filtered_similarity=[0.3], filtered_svm=[0.2], filtered_post=[0.25])
-    assert found == {"svm_ERR": (1, 1, 0, 0), "post_ERR": (0, 1, 0, 0)}
-
-
-def test_without_windows_there_is_no_claim():
+    equal = claims(filtered_post=[0.1, 0.2, math.nan], unfiltered_post=[0.2] * 3)
+    assert equal["filter_FNR"] == (1, 2, 0, 0)
+    stages = claims(filtered_similarity=[0.3], filtered_svm=[0.2], filtered_post=[0.25])
+    assert stages == {"svm_ERR": (1, 1, 0, 0), "post_ERR": (0, 1, 0, 0)}
     assert evidence(tables.windows(table_of("frames", []), 10), 10) == {}
     assert evidence(pd.DataFrame(columns=["variant", "stage"]), 10) == {}
 
@@ -294,17 +285,13 @@ def test_the_filter_is_told_stage_by_stage_and_other_variants_by_their_final_mas
     ]
 
 
-def test_final_masks_of_different_stages_are_subtracted():
+def test_final_masks_of_different_stages_are_subtracted_and_what_was_tuned_from_its_method():
     assert of(("unfiltered", "svm"), ("filtered", "svm"), ("filtered", "smooth")) == [
         ("unfiltered", "filtered", "svm", False),
         ("unfiltered", "filtered", "smooth", True),
     ]
-
-
-def test_what_was_tuned_is_held_against_its_method():
-    assert of(("net", "post"), ("net_tuned", "post"), ("other", "post")) == [
-        ("net", "net_tuned", "post", True)
-    ]
+    tuned = of(("net", "post"), ("net_tuned", "post"), ("other", "post"))
+    assert tuned == [("net", "net_tuned", "post", True)]
 
 
 def test_a_difference_is_the_variant_minus_the_base_on_the_frames_that_both_have():
@@ -397,7 +384,6 @@ def test_a_frame_of_another_size_is_left_out():
 @pytest.mark.parametrize("frames", [254, 255, 256, 511])
 def test_a_sum_that_does_not_fit_in_a_byte_is_carried(frames):
     heat = heat_of(*[enlarged("#..#", "##..")] * frames)
-    assert heat.cells()[1][1, 0, 3] == frames * SIDE**2
     assert heat.cells()[1][1, 0, 3] == frames * SIDE**2
 
 

@@ -171,16 +171,6 @@ def test_each_drive_has_its_own_final_stages():
     ]
 
 
-def test_frames_are_paired_by_stamp_in_the_bases_order_and_equal_stamps_by_theirs():
-    base, new = (
-        pd.DataFrame({"stamp_ns": stamps, "place": range(len(stamps))})
-        for stamps in ([9, 5, 7, 7, 1], [7, 9, 7, 7, 2])
-    )
-    pairs = tables.pair_rows(base, new, ["stamp_ns"])
-    assert pairs["place_base"].tolist() == [0, 2, 3]
-    assert pairs["place"].tolist() == [1, 0, 2]
-
-
 def test_changes_are_those_of_the_frames_that_both_have_in_their_order():
     frames = a_table({CONTROL_POST: [10, 10, 10], POST: [12, 9]})
     found = tables.changes(frames, "filtered", "unfiltered")

@@ -1,5 +1,7 @@
 """Small logs and short ways to say how they are replayed."""
 
+import importlib
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -7,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval import RunConfig, configure
+from roadeval.pipeline.stages import import_stage
 from tests.fixtures.logged import write_drive
 from tests.training.making import frame
 
@@ -38,6 +41,14 @@ def settings(**values: Any) -> RunConfig:
         else:
             tables[key] = tables.get(key, {}) | value if key == "training" else value
     return configure(tables)
+
+
+def write_module(path: Path, text: str) -> None:
+    """Write a module with stages in place of the one of its name that was imported before."""
+    import_stage.cache_clear()
+    sys.modules.pop(path.stem, None)
+    path.write_text(text)
+    importlib.invalidate_caches()
 
 
 def write_log(

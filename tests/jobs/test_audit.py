@@ -164,18 +164,6 @@ def test_audits_that_correct_each_other_are_damaged(place: Path, tmp_path: Path)
     assert "not as roadeval audit writes it" in roadeval.info(place / "drive.mcap", config).problem
 
 
-def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").touch()
-    with pytest.raises(RoadevalError, match="is not empty"):
-        roadeval.audit(place / "drive.rrd", folder=tmp_path)
-
-
-def test_a_fleet_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "fleet.json").write_text("{}")
-    with pytest.raises(RoadevalError, match="a fleet: audit its drives one by one"):
-        roadeval.audit(tmp_path)
-
-
 def test_labels_to_correct_of_reduced_frames_are_refused_before_the_replay(
     place: Path, tmp_path: Path
 ) -> None:
@@ -185,9 +173,16 @@ def test_labels_to_correct_of_reduced_frames_are_refused_before_the_replay(
     assert not (tmp_path / "x").exists()
 
 
-def test_an_annotator_without_masks_is_refused(place: Path) -> None:
+def test_a_fleet_an_annotator_without_masks_and_a_folder_with_something_else_are_refused(
+    place: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "fleet.json").write_text("{}")
+    with pytest.raises(RoadevalError, match="a fleet: audit its drives one by one"):
+        roadeval.audit(tmp_path)
     with pytest.raises(RoadevalError, match="no masks of c"):
         roadeval.audit(place / "drive.rrd", annotators=["c"])
+    with pytest.raises(RoadevalError, match="is not empty"):
+        roadeval.audit(place / "drive.rrd", folder=tmp_path)
 
 
 @pytest.mark.parametrize("words", [[], ["--preset", "gated"]])

@@ -189,7 +189,9 @@ def test_drives_of_a_fleet_with_one_name_have_clips_of_their_own(recording, tmp_
 # --- The log's own messages -----------------------------------------------------------------------
 
 
-def test_the_messages_of_a_clip_replay_to_the_same_truth(recording, tmp_path):
+def test_the_messages_of_a_clip_replay_to_the_same_truth_and_never_replace_their_log(
+    recording, tmp_path
+):
     (film,), losses = roadeval.clip(recording, tmp_path / "f.mp4", frames=range(24, 28), mcap=True)
     assert (film.name, losses) == ("f.mp4", [])
     part = roadeval.Recording(replayed(film.with_suffix(".mcap"))).frames
@@ -197,9 +199,6 @@ def test_the_messages_of_a_clip_replay_to_the_same_truth(recording, tmp_path):
     before = roadeval.Recording(recording).frames.query("4 <= frame < 28")
     assert part["stamp_ns"].tolist() == before["stamp_ns"].tolist()
     assert part[numbers].to_numpy().tolist() == before[numbers].to_numpy().tolist()
-
-
-def test_the_messages_of_a_clip_do_not_take_the_place_of_their_log(recording):
     log = recording.with_suffix(".mcap")
     content = log.read_bytes()
     with pytest.raises(RoadevalError, match=r"drive.mcap: is an input or another output"):

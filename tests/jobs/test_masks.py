@@ -151,12 +151,10 @@ def refused(places, **table) -> str:
     return str(caught.value)
 
 
-def test_masks_of_another_time_are_refused(places, tmp_path):
+def test_masks_of_another_time_or_size_are_refused_unless_they_are_to_be_scaled(places, tmp_path):
     write_drive(tmp_path / "other.mcap", [(10**18, {"/seg": np.eye(4, dtype=np.uint8)})])
     assert "none of them belongs to a frame" in refused(places, path=f"{tmp_path}/other.mcap:/seg")
-
-
-def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, tmp_path):
+    (tmp_path / "other.mcap").unlink()
     for number in range(FRAMES):
         mask = cv2.imread(str(places / "number" / f"frame_{number:04d}.png"), 0)
         cv2.imwrite(str(tmp_path / f"{number}.png"), cv2.resize(mask, (30, 20)) // 128 * 255)

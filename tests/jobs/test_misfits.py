@@ -65,6 +65,9 @@ def test_truth_beside_the_log_that_is_late_is_told_by_info_too_and_its_number_me
     assert said == f"{TRUTH}Set `truth.first` to 3."
     assert roadeval.info(places / "bare.mcap", config).misfits == (said,)
     assert verdict(places / "bare.mcap", tmp_path, truth={**late, "first": 3}) == ""
+    with pytest.raises(RoadevalError, match="only stamps can be moved") as refused:
+        verdict(places / "bare.mcap", tmp_path, truth=late, topics={"sync_offset_ms": 100})
+    assert refused.value.setting == "topics.sync_offset_ms"
 
 
 def test_masks_are_told_with_what_can_be_set_and_no_number_changes(
@@ -78,13 +81,6 @@ def test_masks_are_told_with_what_can_be_set_and_no_number_changes(
     assert "The masks of mirrored are mirrored" in said
     assert "first` to -3" not in said
     assert said.count("No number is corrected for it: mend the masks where they are made.") == 2
-
-
-def test_an_offset_of_stamps_is_refused_where_numbers_pair(places: Path, tmp_path: Path) -> None:
-    late = {"path": str(places / "late"), "first": 0}
-    with pytest.raises(RoadevalError, match="only stamps can be moved") as refused:
-        verdict(places / "bare.mcap", tmp_path, truth=late, topics={"sync_offset_ms": 100})
-    assert refused.value.setting == "topics.sync_offset_ms"
 
 
 SIZES = ((64, 48), (80, 40), (40, 60))

@@ -1,9 +1,7 @@
 """A network as a variant: in the tables, the recording, the report, a fleet and a notebook."""
 
 import hashlib
-import importlib
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +13,8 @@ from roadeval.config.variants import network_variant
 from roadeval.jobs.run import prepared
 from roadeval.jobs.run.prepared import settings_digest
 from roadeval.logs.log import open_log
-from roadeval.pipeline import stages
 from tests.e2e.commands import here
-from tests.jobs.making import settings, write_log
+from tests.jobs.making import settings, write_log, write_module
 from tests.networks.making import network, red_network
 from tests.pipeline import somebody
 
@@ -97,14 +94,11 @@ def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder
 # --- Nothing to learn -----------------------------------------------------------------------------
 
 
-def test_a_network_alone_takes_no_frame_and_needs_no_baseline(folder, tmp_path):
+def test_a_network_alone_needs_no_frame_no_baseline_and_no_truth(folder, tmp_path):
     found = run(folder / "drive.mcap", tmp_path, alone(folder / "red.onnx")).summary
     assert set(found["totals"]) == {"unfiltered"}
     assert found["training"]["pixels"] == 0
     assert found["frames"]["evaluated"] == found["frames"]["labelled"]
-
-
-def test_a_network_alone_runs_on_a_drive_without_truth(folder, tmp_path):
     outcome = run(folder / "bare.mcap", tmp_path, alone(folder / "red.onnx"))
     assert outcome.summary["frames"]["trained_on"] == 0
     assert outcome.summary["training"]["source"] == "none"
@@ -192,7 +186,7 @@ def test_a_frame_on_which_it_fails_is_lost_and_the_rest_is_scored(drive, tmp_pat
     assert "somebody.py" in outcome.tracebacks[0]
 
 
-def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
+def test_where_the_first_frames_all_fail_or_it_cannot_learn_the_run_ends(drive, tmp_path):
     variants = {"mine": somebodys("always_fails"), "fine": somebodys("lower_half")}
     with pytest.raises(roadeval.RoadevalError) as caught:
         run_settings(drive, tmp_path, variants=variants)
@@ -202,9 +196,6 @@ def test_where_the_first_frames_all_fail_the_run_ends(drive, tmp_path):
         "or leave the variant out with `only` filtered `only` unfiltered `only` fine"
     )
     assert "in always_fails" in str(caught.value.__cause__)
-
-
-def test_one_that_cannot_learn_is_named(drive, tmp_path):
     with pytest.raises(roadeval.RoadevalError, match="stage unfit cannot learn: ValueError"):
         run_settings(drive, tmp_path, variants={"mine": somebodys("UNFIT")})
 
@@ -228,10 +219,7 @@ def test_results_tell_the_code_and_are_known_by_it(drive, tmp_path, monkeypatch)
     assert told["sha256"] == hashlib.sha256(Path(somebody.__file__).read_bytes()).hexdigest()
 
     def known_by(text):
-        stages.import_stage.cache_clear()
-        (tmp_path / "changing.py").write_text(text)
-        sys.modules.pop("changing", None)
-        importlib.invalidate_caches()
+        write_module(tmp_path / "changing.py", text)
         return settings_digest(settings(chain=["changing:road", "post"]), "")
 
     monkeypatch.syspath_prepend(tmp_path)

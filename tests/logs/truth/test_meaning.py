@@ -96,16 +96,22 @@ def test_a_value_that_is_not_named_or_does_not_occur_is_refused(labels, setting,
     assert refused.value.setting == setting
 
 
+NO_NAMES = "its keys must all be values, or all colours"
+
+
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
         ({"ignore": (3,)}, "`ignore`: needs `road`"),
         ({"ignore_colors": ((1, 2, 3),)}, "`ignore_colors`: needs `road_colors`"),
         ({"road": (1,), "road_colors": ((1, 2, 3),)}, "as values or as colours"),
+        ({"names": {"road": "3"}}, NO_NAMES),
+        ({"names": {"3": "road", "1,2,3": "car"}}, NO_NAMES),
+        ({"names": {"1,2": "road"}}, NO_NAMES),
     ],
 )
 def test_settings_that_contradict_each_other_are_refused(settings, problem) -> None:
-    with pytest.raises(ValueError, match=problem):
+    with pytest.raises(SettingError if "names" in settings else ValueError, match=problem):
         LabelSettings(**settings)
 
 
@@ -324,12 +330,6 @@ def test_a_plain_mask_has_no_classes_and_more_than_255_have_no_codes():
     meaning = find_meaning(LabelSettings(road=(3,)), [[0, 3]], "/labels")
     codes = meaning.codes.of(np.arange(300, dtype=np.uint16))
     assert codes.tolist() == [*range(255), *[NO_CLASS] * 45]
-
-
-@pytest.mark.parametrize("names", [{"road": "3"}, {"3": "road", "1,2,3": "car"}, {"1,2": "road"}])
-def test_names_of_something_else_than_values_or_colours_are_refused(names):
-    with pytest.raises(SettingError, match="its keys must all be values, or all colours"):
-        LabelSettings(names=names)
 
 
 def log_with_names(path, *infos, labels="/seg/labels"):
