@@ -61,11 +61,6 @@ def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
     assert shown.err.count("\n") == 1
 
 
-def test_a_width_without_a_unit_is_wrong_usage(capsys):
-    assert main(["report", "a.rrd", "--figures", "f", "--width", "8.5"]) == 2
-    assert "8.5 is no width of a figure; write it as 8.5cm" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
@@ -76,9 +71,13 @@ def test_a_width_without_a_unit_is_wrong_usage(capsys):
         ("replay a.mcap --preset robst", "did you mean robust? choose"),
         ("replay a.mcap --only unfilterd", "did you mean unfiltered? choose"),
         ("replay a.mcap --xyzzy", "No such option: --xyzzy; see"),
+        (
+            "report a.rrd --figures f --width 8.5",
+            "8.5 is no width of a figure; write it as 8.5cm",
+        ),
     ],
 )
-def test_what_is_mistyped_is_guessed_by_likeness(words, meant, capsys):
+def test_what_is_mistyped_is_guessed_or_told_in_its_right_form(words, meant, capsys):
     assert main(words.split()) == 2
     assert meant in capsys.readouterr().err
 
@@ -223,12 +222,9 @@ def test_completion_is_installed_for_the_current_shell(tmp_path, monkeypatch, ca
     assert str(file) in capsys.readouterr().out
 
 
-def test_version_goes_to_stdout(capsys):
+def test_version_goes_to_stdout_of_the_command_and_of_an_environments_python(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"roadeval {VERSION}\n"
-
-
-def test_an_environments_python_runs_the_command_too():
     words = [sys.executable, "-m", "roadeval", "--version"]
     run = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (run.returncode, run.stdout) == (0, f"roadeval {VERSION}\n")
@@ -277,28 +273,37 @@ def test_wrong_usage_points_to_the_help(capsys):
     ]
 
 
-def test_an_error_of_the_system_is_a_known_problem(capsys):
-    error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out.rrd")
+LITTLE = (
+    "not enough memory: give it more, or let it take less, by fewer --jobs or a smaller --scale"
+)
+DRAFT = RoadevalError("lacks a size")
+DRAFT.draft = 'file = "n.onnx"\nsize = [?, ?]'
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (
+            OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out.rrd"),
+            ["No space left on device: out.rrd"],
+        ),
+        (MemoryError("std::bad_alloc"), [LITTLE]),
+        (ImportError("failed to map segment"), [LITTLE]),
+        # The draft of a file that mends an error stands below it.
+        (DRAFT, ["lacks a size", "", 'file = "n.onnx"', "size = [?, ?]"]),
+    ],
+)
+def test_what_the_system_or_a_file_lacks_is_a_known_problem(error, told, capsys):
     assert explain(error) == 1
-    assert lines(capsys) == ["roadeval: error: No space left on device: out.rrd"]
+    first, *others = lines(capsys)
+    assert [first.removeprefix("roadeval: error: "), *others] == told
 
 
-def test_the_draft_of_a_file_that_mends_an_error_stands_below_it(capsys):
-    error = RoadevalError("lacks a size")
-    error.draft = 'file = "n.onnx"\nsize = [?, ?]'
-    assert explain(error) == 1
-    asked = ["", 'file = "n.onnx"', "size = [?, ?]"]
-    assert lines(capsys) == ["roadeval: error: lacks a size", *asked]
-
-
-def test_a_defect_keeps_its_traceback_to_itself_but_says_how_to_see_it(capsys):
+def test_a_defect_keeps_its_traceback_to_itself_but_for_who_asks(capsys, monkeypatch):
     assert explain(KeyError("ndi")) == 70
     (line,) = lines(capsys)
     assert line.startswith("roadeval: error: KeyError: 'ndi' (a defect of roadeval")
     assert "ROADEVAL_DEBUG=1" in line
-
-
-def test_the_traceback_is_there_for_who_asks(capsys, monkeypatch):
     monkeypatch.setenv("ROADEVAL_DEBUG", "1")
     try:
         raise KeyError("ndi")
@@ -322,17 +327,6 @@ def test_a_reader_of_stdout_who_has_gone_is_no_error(length, monkeypatch):
         run.stdout.close()
         assert run.stderr.read() == b""
     assert run.returncode == ExitCode.BROKEN_PIPE
-
-
-@pytest.mark.parametrize(
-    "error", [MemoryError("std::bad_alloc"), ImportError("failed to map segment")]
-)
-def test_too_little_memory_is_a_known_problem(error, capsys):
-    assert explain(error) == 1
-    assert lines(capsys) == [
-        "roadeval: error: not enough memory: give it more, or let it take less, by fewer --jobs "
-        "or a smaller --scale"
-    ]
 
 
 @pytest.mark.parametrize(("call", "ours"), [("main()", True), ("main(['--version'])", False)])
@@ -445,13 +439,10 @@ def test_a_stdout_that_takes_nothing_is_one_line(redirected, reason):
     )
 
 
-@pytest.mark.parametrize("redirected", ["2>&-", "2>/dev/full"])
-def test_what_nobody_hears_on_stderr_is_no_error(redirected):
-    done = run(SAYS, redirected)
-    assert (done.returncode, done.stdout.count(b"\n")) == (0, 1)
-
-
-def test_no_file_takes_the_place_of_a_closed_stream():
+def test_what_nobody_hears_on_stderr_is_no_error_and_no_file_takes_a_closed_stream_s_place():
+    for redirected in ("2>&-", "2>/dev/full"):
+        done = run(SAYS, redirected)
+        assert (done.returncode, done.stdout.count(b"\n")) == (0, 1)
     held = "assert os.open('/dev/null', os.O_RDONLY) > 2"
     assert run(held, "<&- >&- 2>&-").returncode == 0
 
