@@ -7,7 +7,7 @@ A Rerun file is a sequence of messages, each with a header; the index is the las
 A message holds rows of one entity, and is read by its place alone.
 
 This module is a fence: nothing else knows the bytes of the format. Rerun's public reader,
-`rerun.chunk.RrdReader`, gives the same rows of a sound file (``tests/recording/test_damage``).
+`rerun.chunk.RrdReader`, gives the same rows of a sound file (``tests/recording/test_rrd_file``).
 But it ended the process on two of 320 files of which a few random bytes were changed, and stopped
 at the damage in nearly all others; here every sound frame is read, and the rest is one line
 (``tests/recording/test_damage``). To read a table takes half the CPU time here, 0.27 s for 0.55 s,
