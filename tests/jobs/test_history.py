@@ -213,6 +213,19 @@ def test_the_base_of_a_comparison_is_the_last_good_run_of_a_folder(made, nights)
     assert compared.content["changed"]
 
 
+def test_a_run_that_cannot_be_read_is_told_where_the_folder_is_the_base(nights, tmp_path):
+    folder = shutil.copytree(nights, tmp_path / "nights")
+    (folder / "2" / "fleet.json").write_text("{")
+    warnings = compare([folder, folder / "7"]).comparison.warnings
+    assert len([text for text in warnings if str(folder / "2" / "fleet.json") in text]) == 1
+
+
+def test_a_folder_of_runs_is_not_compared_with_itself(nights):
+    with pytest.raises(RoadevalError) as failure:
+        compare([nights])
+    assert (failure.value.where, failure.value.problem) == (str(nights), "holds 8 results")
+
+
 def test_a_last_run_without_numbers_neither_undoes_a_step_nor_is_good(nights, tmp_path):
     folder = copy_sums(nights, tmp_path / "nights")
     (folder / "7" / "scores.parquet").write_bytes(b"PAR1")

@@ -91,7 +91,7 @@ def parts_of(result: FrameResult) -> Iterator[tuple[str, str | int, int, int]]:
         halves = np.array_split(errors.array.astype(np.uint8, copy=False), 2, axis=1)
         for name, half in zip(("left", "right"), halves, strict=True):
             wrong, pixels = (half == FP) | (half == FN), half != IGNORED
-            yield variant, name, np.count_nonzero(wrong), np.count_nonzero(pixels)
+            yield variant, name, int(np.count_nonzero(wrong)), int(np.count_nonzero(pixels))
     for variant, by_class in result.classes.items():
         for code in np.flatnonzero(by_class[:NO_CLASS, 0]).tolist():
             yield variant, code, int(by_class[code, 1]), int(by_class[code, 0])
