@@ -244,7 +244,7 @@ def rig(frames: list[Frame], folder: Path) -> Iterator[str]:
         topics = [word for c in cameras[:count] for word in ("--image-topic", f"{c}/image")]
         cost = replay(folder / "rig.mcap", results, *topics)
         page, recording = results / "page.html", results / "out.rrd"
-        paged = run("report", results / "reports", "-o", page)
+        paged = run("report", recording, "-o", page)
         rows.append(
             {
                 "cameras": count,
