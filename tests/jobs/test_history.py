@@ -12,8 +12,8 @@ from roadeval import compare
 from roadeval.errors import RoadevalError
 from roadeval.jobs.results.history import find_results, history, write
 from roadeval.jobs.results.result import Result
-from roadeval.report.blocks import Figure
-from roadeval.report.history import document
+from roadeval.report.blocks import Figure, Heading
+from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict
 from roadeval.results.tables import read_parquet, read_table, write_parquet
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
@@ -211,6 +211,11 @@ def test_the_base_of_a_comparison_is_the_last_good_run_of_a_folder(made, nights)
     compared = compare([nights, nights / "7"])
     assert [result.label for result in compared.comparison.results] == ["4", "7"]
     assert compared.content["changed"]
+
+
+def test_markdown_has_no_heading_of_charts(made):
+    assert "Over the runs" not in markdown(made)
+    assert "Over the runs" in [b.text for b in document(made).blocks if isinstance(b, Heading)]
 
 
 def test_a_run_that_cannot_be_read_is_told_where_the_folder_is_the_base(nights, tmp_path):
