@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from time import perf_counter
 
 from benchmarks.timing import Cost
@@ -17,20 +19,37 @@ ROADEVAL = Path(sys.executable).with_name("roadeval")
 _PEAK = """
 import sys
 from pathlib import Path
-from roadeval.cli.app import main
+from roadeval.__main__ import main
 
-code = main(sys.argv[1:])
-lines = Path("/proc/self/status").read_text().splitlines()
-print(next(line.split()[1] for line in lines if line.startswith("VmHWM")))
+peak = Path(sys.argv.pop(1))
+try:
+    code = main()
+finally:
+    lines = Path("/proc/self/status").read_text().splitlines()
+    peak.write_text(next(line.split()[1] for line in lines if line.startswith("VmHWM")))
 sys.exit(code)
 """
 
 
-def peak_mib(drive: Path, folder: Path, *words: str) -> float:
+@dataclass(frozen=True)
+class CommandCost(Cost):
+    """The cost of a command, CPU time that of all its processes."""
+
+    peak_mib: float
+    """Peak resident memory of its first process; on Linux."""
+
+
+def run(*words: object) -> CommandCost:
+    """Run a command of roadeval without its output, and return its cost."""
+    with NamedTemporaryFile("r") as peak:
+        command = [sys.executable, "-c", _PEAK, peak.name, *map(str, words)]
+        cost = _cost(command)
+        return CommandCost(cost.wall, cost.cpu, int(peak.read()) / 1024)
+
+
+def peak_mib(drive: Path, folder: Path) -> float:
     """Peak resident memory of ``roadeval replay`` in MiB; on Linux, and of that process alone."""
-    command = [sys.executable, "-c", _PEAK, *_replay(drive, folder), "--quiet", *words]
-    run = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
-    return int(run.stdout) / 1024
+    return run(*_replay(drive, folder), "--quiet").peak_mib
 
 
 def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, list[Cost]]:
@@ -52,8 +71,11 @@ def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, li
         "inspect --list": ["inspect", "--list", result],
     }
     for command in commands.values():
-        _cost(*command)
-    return {name: [_cost(*words) for _ in range(runs)] for name, words in commands.items()}
+        _cost([str(ROADEVAL), *command])
+    return {
+        name: [_cost([str(ROADEVAL), *words]) for _ in range(runs)]
+        for name, words in commands.items()
+    }
 
 
 def seconds(drive: Path, folder: Path) -> tuple[float, float]:
@@ -77,9 +99,9 @@ def _replay(drive: Path, folder: Path) -> list[str]:
     return [str(word) for word in ("replay", drive, *outputs)]
 
 
-def _cost(*words: str) -> Cost:
-    """Run a command without its output."""
-    command, start = [str(ROADEVAL), *words], perf_counter()
+def _cost(command: list[str]) -> Cost:
+    """Run a program without its output."""
+    start = perf_counter()
     quiet = [(os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)]
     pid = os.posix_spawn(command[0], command, os.environ, file_actions=quiet)
     _, status, used = os.wait4(pid, 0)

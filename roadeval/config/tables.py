@@ -65,6 +65,7 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     `roadeval.config.run.load_config`.
     """
     file = Path(path)
+    text: str | None = ""
     try:
         check_input(file)
         if file.suffix == ".rrd":
@@ -80,6 +81,10 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
+        lines = (text or "").splitlines()
+        if unfilled := [line for line in lines if line.partition("#")[0].rstrip().endswith("= ?")]:
+            problem = f"has no value yet in the line '{unfilled[0].strip()}'"
+            raise ConfigError(problem, where=file, remedy="write one in place of the ?") from error
         raise ConfigError(f"{path}: cannot be read as TOML: {error}") from error
     if not trusted or file.suffix == ".rrd":
         _refuse_code(tables, path)

@@ -42,6 +42,8 @@ def concatenate(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     parts = [part for part in all_parts if len(part)] or all_parts[:1]
     words = {n: None for part in all_parts for n in part.columns[part.dtypes == "category"]}
     for name in words if len(parts) > 1 else ():
+        if len({part[name].dtype for part in parts}) == 1:
+            continue
         columns = [part[name].astype("category") for part in parts]
         # A column without any word has no categories of text.
         columns = [c.cat.rename_categories([*map(str, c.cat.categories)]) for c in columns]
@@ -204,7 +206,10 @@ def pair_rows(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.Da
     tables = []
     for table in (base, new):
         words = {name: table[name].astype(str) for name in on if table[name].dtype == "category"}
-        tables.append(table.assign(**words, nth=group_rows(table, on).cumcount()))
+        tables.append(table.assign(**words))
+    if not any(table.duplicated([*on]).any() for table in tables):
+        return tables[0].merge(tables[1], on=[*on], suffixes=("_base", ""))
+    tables = [table.assign(nth=group_rows(table, on).cumcount()) for table in tables]
     pairs = tables[0].merge(tables[1], on=[*on, "nth"], suffixes=("_base", ""))
     return pairs.drop(columns="nth")
 

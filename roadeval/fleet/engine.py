@@ -30,6 +30,8 @@ _LOCAL: Final = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
+    # Dask's profiler looks at each worker's stack a hundred times a second; nobody reads it.
+    "distributed.worker.profile.enabled": False,
     # Dask's own MALLOC_TRIM_THRESHOLD_ is left out: with it every image is mapped and cleared
     # again, and a drive takes twice as long.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(

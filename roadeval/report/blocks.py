@@ -165,9 +165,20 @@ class Table(Block):
 
 
 def blocks_as_markdown(blocks: Iterable[Block]) -> str:
-    """Return headings, texts, lists and tables as Markdown, without other blocks."""
+    """Return headings, texts, lists and tables as Markdown, without other blocks.
+
+    A heading below which nothing is left stays away, too.
+    """
+    from_last: list[Block] = []
+    for block in reversed([*blocks]):
+        below = from_last[-1:]
+        if isinstance(block, Heading):
+            if below and not (isinstance(below[0], Heading) and below[0].level <= block.level):
+                from_last.append(block)
+        elif isinstance(block, Text | BulletList | Table):
+            from_last.append(block)
     lines: list[str] = []
-    for block in blocks:
+    for block in reversed(from_last):
         match block:
             case Heading():
                 lines += [f"{'#' * (block.level + 1)} {as_markdown(block.text)}", ""]

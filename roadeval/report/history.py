@@ -16,7 +16,7 @@ from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
 from roadeval.report import blocks
 from roadeval.report.blocks import Block, BulletList, Cell, Details, Heading, Table, Text
-from roadeval.report.captions import note
+from roadeval.report.captions import caption, note
 from roadeval.report.chart import FAINT, WORSE, Chart, ChartKind, Look, Series, looks
 from roadeval.report.comparison import limits
 from roadeval.results.history import Event, History, describe_change, verdict
@@ -97,8 +97,9 @@ def _figures(history: History) -> Iterator[Block]:
     """Yield charts of the levels: of all pixels, then of what moved most."""
     masks = [line for line in history.lines if line.kind == ALL]
     by_rate = {rate: [m for m in masks if m.rate == rate] for rate in (m.rate for m in masks)}
-    yield blocks.Figure([_chart(history, rate, lines) for rate, lines in by_rate.items()], "")
-    yield note("levels")
+    yield blocks.Figure(
+        [_chart(history, rate, lines) for rate, lines in by_rate.items()], caption("levels")
+    )
     parts = [m for m in history.lines if m.kind != ALL and m.variant == history.focus and m.steps]
     parts.sort(key=lambda line: float(np.nanmin(line.levels) - np.nanmax(line.levels)))
     if parts:

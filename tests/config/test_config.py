@@ -88,6 +88,10 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ("chain = ['svm', 'svm', 'post']", "a stage can occur only once"),
         ("preset = 'best'", r"preset: there is no 'best'; choose .*paper"),
         ("x = ", "cannot be read as TOML"),
+        (
+            "# x = ?\nx = ?  # a whole number",
+            r"no value yet in the line 'x = \?  # a whole number'",
+        ),
     ],
 )
 def test_a_bad_key_or_value_is_named(tmp_path, text, message):

@@ -10,8 +10,8 @@ import pytest
 
 from roadeval import Result, RoadevalError, compare, history
 from roadeval.jobs.results.history import find_results, write
-from roadeval.report.blocks import Figure
-from roadeval.report.history import document
+from roadeval.report.blocks import Figure, Heading
+from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict
 from roadeval.results.tables import read_parquet, read_table, write_parquet
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
@@ -209,6 +209,24 @@ def test_the_base_of_a_comparison_is_the_last_good_run_of_a_folder(made, nights)
     compared = compare([nights, nights / "7"])
     assert [result.label for result in compared.comparison.results] == ["4", "7"]
     assert compared.content["changed"]
+
+
+def test_markdown_has_no_heading_of_charts(made):
+    assert "Over the runs" not in markdown(made)
+    assert "Over the runs" in [b.text for b in document(made).blocks if isinstance(b, Heading)]
+
+
+def test_a_run_that_cannot_be_read_is_told_where_the_folder_is_the_base(nights, tmp_path):
+    folder = shutil.copytree(nights, tmp_path / "nights")
+    (folder / "2" / "fleet.json").write_text("{")
+    warnings = compare([folder, folder / "7"]).comparison.warnings
+    assert len([text for text in warnings if str(folder / "2" / "fleet.json") in text]) == 1
+
+
+def test_a_folder_of_runs_is_not_compared_with_itself(nights):
+    with pytest.raises(RoadevalError) as failure:
+        compare([nights])
+    assert (failure.value.where, failure.value.problem) == (str(nights), "holds 8 results")
 
 
 def test_a_last_run_without_numbers_neither_undoes_a_step_nor_is_good(nights, tmp_path):

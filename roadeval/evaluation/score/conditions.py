@@ -90,8 +90,8 @@ def parts_of(result: FrameResult) -> Iterator[tuple[str, str | int, int, int]]:
     for variant, errors in result.errors.items():
         halves = np.array_split(errors.array.astype(np.uint8, copy=False), 2, axis=1)
         for name, half in zip(("left", "right"), halves, strict=True):
-            by_outcome = np.bincount(half.ravel(), minlength=IGNORED + 1)
-            yield variant, name, int(by_outcome[[FP, FN]].sum()), int(by_outcome[:IGNORED].sum())
+            wrong, pixels = (half == FP) | (half == FN), half != IGNORED
+            yield variant, name, int(np.count_nonzero(wrong)), int(np.count_nonzero(pixels))
     for variant, by_class in result.classes.items():
         for code in np.flatnonzero(by_class[:NO_CLASS, 0]).tolist():
             yield variant, code, int(by_class[code, 1]), int(by_class[code, 0])

@@ -112,15 +112,15 @@ def evidence(windows: pd.DataFrame, size: int) -> dict[str, dict[str, int]]:
     have both rates, and the number in which it ``held``; ``short`` and ``short_held`` count windows
     with fewer frames.
     """
+    keys = [*KEY, "window"]
+    by_mask = {mask: rows.set_index(keys) for mask, rows in tables.group_rows(windows, tables.MASK)}
     evidence_by_claim = {}
-    masks = set(masks_of(windows))
     for name, (rate, better, worse) in CLAIMS.items():
-        if not {better, worse} <= masks:
+        if not {better, worse} <= by_mask.keys():
             continue
-        base, new = (only(windows, variant=mask[0], stage=mask[1]) for mask in (worse, better))
-        pairs = pair_rows(base, new, [*KEY, "window"])
-        difference = pairs[rate] - pairs[f"{rate}_base"]
-        full = pairs[["frames", "frames_base"]].min(axis=1) == size
+        base, new = by_mask[worse], by_mask[better]
+        difference = new[rate] - base[rate]
+        full = (new["frames"] == size) & (base["frames"] == size)
         held, defined = difference < 0, difference.notna()
         counts = {"held": full & held, "windows": full & defined}
         counts |= {"short_held": ~full & held, "short": ~full & defined}

@@ -19,7 +19,7 @@ from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.results.history import last_good
+from roadeval.jobs.results.history import find_results, last_good
 from roadeval.jobs.results.result import DriveResult, Result, local_path
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
@@ -88,7 +88,15 @@ def compare(
     if not paths:
         raise RoadevalError("nothing to compare: name one result, or several")
     across = len(paths) == 1
-    paths[:1] = paths[:1] if across else [last_good(paths[0], paths[1:], on_progress)]
+    unread: Sequence[str] = ()
+    if across and len(paths := find_results(folder := paths[0])) > 1:
+        raise RoadevalError(
+            f"holds {len(paths)} results",
+            where=folder,
+            remedy="name behind it the result to hold against them, or use 'roadeval history'",
+        )
+    if not across:
+        paths[0], unread = last_good(paths[0], paths[1:], on_progress)
     opened = [Result(path) for path in paths]
     if across:
         opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
@@ -114,7 +122,7 @@ def compare(
     )
     ends = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
     lost = dict.fromkeys(filter(None, map(_failure_sentence, opened)))
-    comparison = replace(comparison, warnings=(*lost, *ends, *comparison.warnings))
+    comparison = replace(comparison, warnings=(*lost, *unread, *ends, *comparison.warnings))
     alone = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: result.drive

@@ -168,16 +168,20 @@ def find_results(path: Path) -> list[Path]:
     return folders or recordings
 
 
-def last_good(path: Path, besides: Sequence[Path], on_progress: OnProgress = ignore) -> Path:
+def last_good(
+    path: Path, besides: Sequence[Path], on_progress: OnProgress = ignore
+) -> tuple[Path, Sequence[str]]:
     """Return a result's path, or of a folder of runs the newest that no lasting step made worse.
 
-    Results ``besides`` are no runs of the folder.
+    Results ``besides`` are no runs of the folder. Returned with it are the runs that could not be
+    read, and why.
     """
     taken = {other.resolve() for other in besides}
     paths = [result for result in find_results(path) if result.resolve() not in taken]
     if len(paths) < 2:
-        return (paths or [path])[0]
-    return Path(history(paths, on_progress=on_progress).last_good.paths[0])
+        return (paths or [path])[0], ()
+    runs = history(paths, on_progress=on_progress)
+    return Path(runs.last_good.paths[0]), runs.lost
 
 
 def _runs_in_order(

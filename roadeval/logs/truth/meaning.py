@@ -266,7 +266,11 @@ def count_values(
     pixels = to_rgb(picture, limits) if labels.road_colors else to_labels(picture, limits)
     packed = pixels if pixels.ndim == 2 else pack_colors(pixels)
     packed = np.maximum(packed, LEAST) if packed.dtype.kind == "i" else packed
-    values, counts = np.unique(packed, return_counts=True)
+    if packed.dtype == np.uint8:  # without sorting the pixels
+        counts = np.bincount(packed.ravel())
+        values, counts = counts.nonzero()[0], counts[counts > 0]
+    else:
+        values, counts = np.unique(packed, return_counts=True)
     if pixels.ndim != 2 and not labels.road_colors:
         raise LogError(
             f"{name} holds the colours {_listed(map(_color_name, values.tolist()))}",
