@@ -16,6 +16,7 @@ from roadeval.report.blocks import Figure, Heading
 from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict
 from roadeval.results.tables import read_parquet, read_table, write_parquet
+from tests.fleet.serving import Server
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
 DAY = 86_400
@@ -223,6 +224,15 @@ def test_a_run_that_cannot_be_read_is_told_where_the_folder_is_the_base(nights, 
     (folder / "2" / "fleet.json").write_text("{")
     warnings = compare([folder, folder / "7"]).comparison.warnings
     assert len([text for text in warnings if str(folder / "2" / "fleet.json") in text]) == 1
+
+
+def test_a_place_without_results_does_not_end_a_history(nights, tmp_path):
+    with Server() as server:
+        made = history([nights, tmp_path, server.url("404/night.zip")])
+    assert len(made.runs) == 8
+    of_folder, of_url = made.lost
+    assert of_folder.startswith(str(tmp_path))
+    assert server.url("404/night.zip") in of_url
 
 
 def test_a_folder_of_runs_is_not_compared_with_itself(nights):

@@ -51,7 +51,8 @@ def history(
     from roadeval.jobs.outputs import holding
     from roadeval.jobs.results import history as job
 
-    with holding(*(output or ()), inputs=job.list_results(results)):
+    places, _ = job.list_results(results)
+    with holding(*(output or ()), inputs=places):
         with progress.show(quiet or json) as watch:
             made = job.history(results, by=by, last=last, fail_if=fail_if or [], on_progress=watch)
         for path in output or []:

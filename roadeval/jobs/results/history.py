@@ -96,10 +96,10 @@ def history(
         Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    lost: list[str] = []
+    places, lost = list_results(results)
     origins: dict[Path, Origin] = {}
     drives: dict[Path, Result] = {}  # the facts of hundreds of fleets would fill the memory
-    for path in list_results(results):
+    for path in places:
         try:
             result = Result(path)
             if not result.complete:
@@ -143,9 +143,15 @@ def history(
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
 
 
-def list_results(results: Paths) -> list[Path]:
-    """Return the paths of results, and of those below folders."""
-    return [path for place in list_paths(results) for path in find_results(local_path(place))]
+def list_results(results: Paths) -> tuple[list[Path], list[str]]:
+    """Return the paths of results, and of those below folders, and why some are not there."""
+    paths, lost = list[Path](), list[str]()
+    for place in list_paths(results):
+        try:
+            paths += find_results(local_path(place))
+        except RoadevalError as error:
+            lost.append(error.sentence)
+    return paths, lost
 
 
 def find_results(path: Path) -> list[Path]:
