@@ -16,13 +16,15 @@ import re
 import shutil
 import zlib
 from base64 import b64encode
-from collections.abc import Callable
-from concurrent.futures import wait
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, wait
 from datetime import datetime, timedelta
 from functools import cache, partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
+from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 from zipfile import BadZipFile, ZipFile, is_zipfile
@@ -36,6 +38,7 @@ from roadeval.fleet.drives import (
     public_source,
     scheme_of,
 )
+from roadeval.logs.container.records import FarFile
 from roadeval.logs.log import RemoteLog, Traffic
 from roadeval.results.facts import FETCHED, FLEET, SUMMARY
 from roadeval.runtime.threads import in_thread
@@ -52,6 +55,12 @@ PART: Final = 64 << 10
 """Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
 TAIL: Final = 128 << 10
 """Bytes at the end that are read at once, and kept: the summary of a log of one gigabyte."""
+AT_ONCE: Final = 16
+"""Most parts that are read ahead at once."""
+AHEAD: Final = 8 << 20
+"""Bytes that are read ahead, and bytes that are kept behind."""
+PIECE: Final = 2 << 20
+"""Most bytes of a part that is read ahead."""
 ROOM: Final = 2 << 30
 """Bytes of a result that are fetched, and unpacked, at most."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
@@ -88,7 +97,9 @@ def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> P
     if not is_url(source):
         return Path(source)
     name, place = Path(file_name(source)), _open_store(source, patience_s)
-    file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
+    state = _state_of(place)
+    place.traffic.total = state.size
+    file = cast("IO[bytes]", _RemoteFile(place, state))
     return RemoteLog(public_source(source), name, file, place.traffic)
 
 
@@ -153,67 +164,135 @@ class _FileState(NamedTuple):
         return self.size != other.size or (one != two and "" not in (one, two)) or is_later
 
 
-class _RemoteFile:
+class _Part(NamedTuple):
+    """Bytes of a file that were asked for."""
+
+    begin: int
+    end: int
+    answer: Future[tuple[_FileState, bytearray]]
+
+
+class _RemoteFile(FarFile):
     """A file elsewhere that is read in parts; a `FleetError` if it changes meanwhile."""
 
     def __init__(self, place: _Place, state: _FileState) -> None:
         self._place, self._state, self._size, self._at = place, state, state.size, 0
         tag = state.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
-        self._begin, self._part, self._tail = 0, b"", b""
+        self._lock = Lock()
+        self._tail: _Part | None = None
+        self._kept: list[_Part] = []
+        """Parts that were read, or passed by."""
+        self._ahead: list[_Part] = []
+        self._expected: deque[tuple[int, int]] = deque()
+        """Parts that will be read after those."""
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + (self._size if whence == os.SEEK_END else 0)
         return self._at
 
     def read(self, size: int) -> bytes:
-        begin, end = self._at, min(self._at + size, self._size)
-        tail = max(self._size - TAIL, 0)
-        if begin >= tail:
-            self._tail = self._tail or self._fetch(tail, self._size)
-            self._at = max(begin, end)
-            return self._tail[begin - tail : self._at - tail]
-        if not self._begin <= begin <= end <= self._begin + len(self._part):
-            self._part = self._fetch(begin, min(max(end, begin + PART), self._size))
-            self._begin = begin
+        begin, end, content = self._at, min(self._at + size, self._size), bytearray()
         self._at = max(begin, end)
-        return self._part[begin - self._begin : self._at - self._begin]
+        while begin < end:
+            part = self._part(begin, end)
+            content += self._content(part)[begin - part.begin : end - part.begin]
+            begin = part.end
+        return bytes(content)
 
-    def _fetch(self, begin: int, end: int) -> bytes:
+    def expect(self, parts: Iterable[tuple[int, int]]) -> None:
+        self._keep(self._ahead)
+        self._ahead, self._expected = [], deque()
+        for begin, stop in dict.fromkeys(parts):
+            end = min(stop, self._size - TAIL)
+            ends = begin, end - 1
+            if begin >= end or all(any(k[0] <= at < k[1] for k in self._kept) for at in ends):
+                continue
+            first, last = self._expected[-1] if self._expected else (end, end)
+            if first <= begin <= last + PART and end <= first + PIECE:
+                self._expected[-1] = first, max(last, end)
+            else:
+                self._expected += [(at, min(at + PIECE, end)) for at in range(begin, end, PIECE)]
+        self._read_ahead()
+
+    def _read_ahead(self) -> None:
+        """Ask for the next parts, as many as there is room for."""
+        while self._expected and len(self._ahead) < AT_ONCE and _size(self._ahead) < AHEAD:
+            self._ahead.append(self._ask_for(*self._expected.popleft()))
+
+    def _keep(self, parts: Sequence[_Part]) -> None:
+        self._kept += parts
+        while len(self._kept) > AT_ONCE or (len(self._kept) > 1 and _size(self._kept) > AHEAD):
+            del self._kept[0]
+
+    def _part(self, begin: int, end: int) -> _Part:
+        """Return a part that holds a byte, and perhaps those up to another."""
+
+        def holds(part: tuple[Any, ...]) -> bool:
+            return part[0] <= begin < part[1]
+
+        if begin >= (tail := max(self._size - TAIL, 0)):
+            self._tail = self._tail or self._ask_for(tail, self._size)
+            return self._tail
+        if kept := next(filter(holds, reversed(self._kept)), None):
+            return kept
+        if part := next(filter(holds, self._ahead), None):
+            count = self._ahead.index(part) + 1
+            passed, self._ahead = self._ahead[:count], self._ahead[count:]
+            self._keep(passed)
+            self._read_ahead()
+            return part
+        if expected := next(filter(holds, self._expected), None):
+            self._expected.remove(expected)
+        # One byte more, as the last byte of a chunk is read alone.
+        part = self._ask_for(*(expected or (begin, min(max(end + 1, begin + PART), self._size))))
+        self._keep([part])
+        return part
+
+    def _ask_for(self, begin: int, end: int) -> _Part:
+        self._place.traffic.requests += 1
+        return _Part(begin, end, in_thread(partial(self._fetch, begin, end)))
+
+    def _fetch(self, begin: int, end: int) -> tuple[_FileState, bytearray]:
         import obstore
 
-        if begin >= end:
-            return b""
         options = {"range": (begin, end), **self._options}
+        answer = obstore.get(self._place.store, self._place.key, options=options)
+        content = bytearray()
+        for piece in answer.stream(min_chunk_size=1 << 20):
+            content += piece
+            if len(content) > end - begin:  # the stream may never end
+                break
+        with self._lock:
+            self._place.traffic.bytes += len(content)
+        return _FileState.of(answer.meta), content
 
-        def read_part() -> tuple[_FileState, bytes]:
-            answer = obstore.get(self._place.store, self._place.key, options=options)
-            content = bytearray()
-            for piece in answer.stream(min_chunk_size=1 << 20):
-                content += piece
-                if len(content) > end - begin:  # the stream may never end
-                    break
-            return _FileState.of(answer.meta), bytes(content)
-
+    def _content(self, part: _Part) -> bytearray:
+        """Wait for a part, and return its bytes."""
         where = public_source(self._place.url)
         try:
-            state, content = _ask(self._place.url, read_part)
+            state, content = _wait_for(self._place.url, part.answer)
         except FleetError as error:
             if error.problem != NO_PARTS:
                 raise
             problem = "the server gives no parts of files"
             raise FleetError(problem, where=where, remedy="copy the file here") from None
-        self._place.traffic.requests += 1
-        self._place.traffic.bytes += len(content)
         if state.differs(self._state):
             raise FleetError(CHANGED, where=where)
-        if len(content) != end - begin:
-            problem = "ended early" if len(content) < end - begin else "the server sends too much"
+        if len(content) != part.end - part.begin:
+            is_short = len(content) < part.end - part.begin
+            problem = "ended early" if is_short else "the server sends too much"
             raise FleetError(problem, where=where)
         return content
 
     def close(self) -> None:
-        self._part = self._tail = b""
+        # A thread in the midst of an answer may outlive the interpreter.
+        wait([part.answer for part in self._ahead], _POLL_S)
+        self._expected, self._ahead, self._kept, self._tail = deque(), [], [], None
+
+
+def _size(parts: Sequence[_Part]) -> int:
+    return sum(part.end - part.begin for part in parts)
 
 
 def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:
@@ -287,7 +366,11 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
 
     It runs in its own thread, as obstore does not notice Ctrl-C while it waits for a server.
     """
-    answer = in_thread(lambda: function(*arguments, **options))
+    return _wait_for(url, in_thread(lambda: function(*arguments, **options)))
+
+
+def _wait_for(url: str, answer: Future[Answer]) -> Answer:
+    """Wait for the answer of a thread, whose errors are those of `_ask`."""
     # The wait is divided, as a signal that another thread receives does not end one long wait.
     while not wait([answer], _POLL_S).done:
         pass
