@@ -17,14 +17,13 @@ import shutil
 import zlib
 from base64 import b64encode
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, wait
 from datetime import datetime, timedelta
 from functools import cache, partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
-from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeVar, cast
 from urllib.parse import unquote, urlsplit, urlunsplit
 from zipfile import BadZipFile, ZipFile, is_zipfile
@@ -47,6 +46,7 @@ if TYPE_CHECKING:
     from obstore import ObjectMeta
 
 Answer = TypeVar("Answer")
+Bounds = TypeVar("Bounds", bound=tuple[Any, ...])
 
 PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
@@ -56,11 +56,9 @@ PART: Final = 64 << 10
 TAIL: Final = 128 << 10
 """Bytes at the end that are read at once, and kept: the summary of a log of one gigabyte."""
 AT_ONCE: Final = 16
-"""Most parts that are read ahead at once."""
-AHEAD: Final = 8 << 20
-"""Bytes that are read ahead, and bytes that are kept behind."""
-PIECE: Final = 2 << 20
-"""Most bytes of a part that is read ahead."""
+"""Parts that are read ahead at once; as many that were read are kept."""
+PIECE: Final = 1 << 20
+"""Most bytes of a part that is read ahead or kept."""
 ROOM: Final = 2 << 30
 """Bytes of a result that are fetched, and unpacked, at most."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
@@ -97,9 +95,7 @@ def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> P
     if not is_url(source):
         return Path(source)
     name, place = Path(file_name(source)), _open_store(source, patience_s)
-    state = _state_of(place)
-    place.traffic.total = state.size
-    file = cast("IO[bytes]", _RemoteFile(place, state))
+    file = cast("IO[bytes]", _RemoteFile(place, _state_of(place)))
     return RemoteLog(public_source(source), name, file, place.traffic)
 
 
@@ -179,13 +175,13 @@ class _RemoteFile(FarFile):
         self._place, self._state, self._size, self._at = place, state, state.size, 0
         tag = state.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
-        self._lock = Lock()
+        place.traffic.total = self._size
         self._tail: _Part | None = None
-        self._kept: list[_Part] = []
+        self._kept = deque[_Part](maxlen=AT_ONCE)
         """Parts that were read, or passed by."""
         self._ahead: list[_Part] = []
-        self._expected: deque[tuple[int, int]] = deque()
-        """Parts that will be read after those."""
+        self._expected: list[tuple[int, int]] = []
+        """Parts that will be asked for after those."""
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + (self._size if whence == os.SEEK_END else 0)
@@ -201,12 +197,11 @@ class _RemoteFile(FarFile):
         return bytes(content)
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
-        self._keep(self._ahead)
-        self._ahead, self._expected = [], deque()
+        self._kept += self._ahead
+        self._ahead, self._expected = [], []
         for begin, stop in dict.fromkeys(parts):
             end = min(stop, self._size - TAIL)
-            ends = begin, end - 1
-            if begin >= end or all(any(k[0] <= at < k[1] for k in self._kept) for at in ends):
+            if begin >= end or all(_holding(self._kept, at) for at in (begin, end - 1)):
                 continue
             first, last = self._expected[-1] if self._expected else (end, end)
             if first <= begin <= last + PART and end <= first + PIECE:
@@ -216,41 +211,34 @@ class _RemoteFile(FarFile):
         self._read_ahead()
 
     def _read_ahead(self) -> None:
-        """Ask for the next parts, as many as there is room for."""
-        while self._expected and len(self._ahead) < AT_ONCE and _size(self._ahead) < AHEAD:
-            self._ahead.append(self._ask_for(*self._expected.popleft()))
-
-    def _keep(self, parts: Sequence[_Part]) -> None:
-        self._kept += parts
-        while len(self._kept) > AT_ONCE or (len(self._kept) > 1 and _size(self._kept) > AHEAD):
-            del self._kept[0]
+        count = AT_ONCE - len(self._ahead)
+        self._ahead += [self._ask_for(*part) for part in self._expected[:count]]
+        del self._expected[:count]
 
     def _part(self, begin: int, end: int) -> _Part:
         """Return a part that holds a byte, and perhaps those up to another."""
-
-        def holds(part: tuple[Any, ...]) -> bool:
-            return part[0] <= begin < part[1]
-
         if begin >= (tail := max(self._size - TAIL, 0)):
             self._tail = self._tail or self._ask_for(tail, self._size)
             return self._tail
-        if kept := next(filter(holds, reversed(self._kept)), None):
-            return kept
-        if part := next(filter(holds, self._ahead), None):
+        if part := _holding(reversed(self._kept), begin):
+            return part
+        if part := _holding(self._ahead, begin):
             count = self._ahead.index(part) + 1
-            passed, self._ahead = self._ahead[:count], self._ahead[count:]
-            self._keep(passed)
+            self._kept += self._ahead[:count]
+            del self._ahead[:count]
             self._read_ahead()
             return part
-        if expected := next(filter(holds, self._expected), None):
+        if expected := _holding(self._expected, begin):
             self._expected.remove(expected)
         # One byte more, as the last byte of a chunk is read alone.
         part = self._ask_for(*(expected or (begin, min(max(end + 1, begin + PART), self._size))))
-        self._keep([part])
+        if part.end - part.begin <= PIECE:
+            self._kept.append(part)
         return part
 
     def _ask_for(self, begin: int, end: int) -> _Part:
         self._place.traffic.requests += 1
+        self._place.traffic.bytes += end - begin
         return _Part(begin, end, in_thread(partial(self._fetch, begin, end)))
 
     def _fetch(self, begin: int, end: int) -> tuple[_FileState, bytearray]:
@@ -263,8 +251,6 @@ class _RemoteFile(FarFile):
             content += piece
             if len(content) > end - begin:  # the stream may never end
                 break
-        with self._lock:
-            self._place.traffic.bytes += len(content)
         return _FileState.of(answer.meta), content
 
     def _content(self, part: _Part) -> bytearray:
@@ -288,11 +274,12 @@ class _RemoteFile(FarFile):
     def close(self) -> None:
         # A thread in the midst of an answer may outlive the interpreter.
         wait([part.answer for part in self._ahead], _POLL_S)
-        self._expected, self._ahead, self._kept, self._tail = deque(), [], [], None
+        self._expected, self._ahead, self._tail = [], [], None
+        self._kept.clear()
 
 
-def _size(parts: Sequence[_Part]) -> int:
-    return sum(part.end - part.begin for part in parts)
+def _holding(parts: Iterable[Bounds], at: int) -> Bounds | None:
+    return next((part for part in parts if part[0] <= at < part[1]), None)
 
 
 def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:

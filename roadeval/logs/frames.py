@@ -536,15 +536,10 @@ class FrameStream:
 
     def parts(self) -> Iterator[Sequence[tuple[int, int]]]:
         """Yield the bytes of the log that hold each frame and its labels, by their log times."""
-        images = self.selection.camera.images
-        sources = [images.parts(np.asarray(self.numbers, np.intp))]
-        for source, _ in self._labels.values():
-            labels = source.pictures
-            if isinstance(labels, TopicReader) and len(labels) and labels.is_beside(images):
-                late = labels.delays[0] - images.delays[0] if labels.delays and images.delays else 0
-                places = np.searchsorted(labels.log_times, self.log_times + late)
-                sources.append(labels.parts(places))
-        yield from zip(*sources, strict=True)
+        images, labels = self.selection.camera.images, self.selection.labels.values()
+        topics = [s.pictures for s in labels if isinstance(s.pictures, TopicReader)]
+        readers = [images, *(topic for topic in topics if topic.is_beside(images))]
+        yield from zip(*(reader.parts(self.log_times) for reader in readers), strict=True)
 
     @property
     def log_times(self) -> npt.NDArray[np.int64]:

@@ -36,6 +36,7 @@ _CANDIDATE: Final = re.compile(
 )
 """The head of a record that is shorter than 4 GiB or was never ended, or a log's first bytes."""
 _HEADS: Final = HEAD.size + MESSAGE_HEAD.size
+_CHUNK_BEGIN: Final = HEAD.size + records.CHUNK_BEGIN
 _NOT_IN_CHUNKS: Final = (CHUNK, records.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that never lie inside a chunk, unlike messages and their descriptions."""
 RECORDS: Final = 1 << 18
@@ -98,7 +99,11 @@ class Scan:
         begun = self.source[0 : len(MAGIC)] == MAGIC
         if not begun:
             self.gaps.append(Gap(0, len(MAGIC), "the file does not begin as it should", False))
-        self.source.expect(self._parts_of_walk())
+        index_ends, most = self.summary.index_ends, records.IN_MEMORY
+        self.source.expect(  # the indexes of each chunk, and the head of the next one
+            (chunk.data_end, min(index_ends[at], chunk.data_end + most) + _CHUNK_BEGIN)
+            for at, chunk in sorted(self.summary.chunks.items())
+        )
         record = Record(BORDER, 0, 0, len(MAGIC) if begun else 0)
         while record.opcode != END:
             try:
@@ -117,15 +122,6 @@ class Scan:
         if self.data_end is None and size not in ends:
             reason = "the file was never finished; what came after is not in it"
             self.gaps.append(Gap(size, size, reason))
-
-    def _parts_of_walk(self) -> Iterator[tuple[int, int]]:
-        """Yield the bytes from the end of each chunk to the head of the next one."""
-        chunks = sorted(self.summary.chunks.values())
-        following = [*(chunk.offset for chunk in chunks[1:]), len(self.source)]
-        for chunk, offset in zip(chunks, following, strict=False):
-            # Of an attachment between them only the head is read.
-            end = min(self.summary.index_ends[chunk.offset], offset)
-            yield chunk.data_end, end + HEAD.size + records.CHUNK_BEGIN
 
     def _following(self, record: Record) -> Record:
         """Read the record behind this one; a `BadRecord` if that shows that either is damaged."""

@@ -311,20 +311,20 @@ class TopicReader:
         _, number, chunk = self._places[position].tolist()
         return self.channels[number].container.is_bad(chunk)
 
-    def parts(self, positions: npt.NDArray[np.intp]) -> Iterator[tuple[int, int]]:
-        """Yield the bytes of the file that hold some messages: those of their chunks."""
-        places = self._places[np.minimum(positions, len(self) - 1)]
-        for _, number, chunk in places.tolist():
+    def parts(self, log_times: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+        """Yield the bytes of the file that hold messages of some times: those of their chunks."""
+        positions = np.searchsorted(self.log_times[:-1], log_times)
+        for _, number, chunk in self._places[positions].tolist():
             container = self.channels[number].container
-            if chunk != OUTSIDE:
+            if chunk == OUTSIDE:
+                yield 0, 0
+            else:
                 begin, data = container.source.begin, container.chunks[chunk]
                 yield begin + data.data_offset, begin + data.data_end
-            else:
-                yield 0, 0
 
     def is_beside(self, other: TopicReader) -> bool:
-        """Return whether its messages lie in the same files as those of another topic."""
-        return self._files is other._files
+        """Return whether there are messages, in the same files as those of another topic."""
+        return len(self) > 0 and self._files is other._files
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
         """Say which bytes of its file will be read next, see `FileBytes.expect`."""

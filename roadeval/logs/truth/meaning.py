@@ -484,7 +484,7 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
     for count, position in enumerate(positions := sorted({*first, *spread})):
         if count == 1 and isinstance(pictures, TopicReader):  # often the first one does
-            pictures.expect(pictures.parts(np.asarray(positions)))
+            pictures.expect(pictures.parts(pictures.log_times[positions]))
         with suppress(FrameError):
             picture = pictures.picture(position)
             pictures.stamp(position)  # this shows how late labels are logged
