@@ -90,7 +90,7 @@ def test_of_a_range_without_labels_little_but_its_chunks_is_read(server, tmp_pat
         roadeval.replay(drive, config, reports=tmp_path / folder)
     files = [(tmp_path / folder / "unlabelled.csv").read_bytes() for folder in ("far", "near")]
     assert files[0] == files[1]
-    assert server.sent < (5 + 3) * CHUNK + 500_000  # its chunks, and the first ones
+    assert server.sent < (5 + 1) * CHUNK + 300_000  # its chunks, and the first one
 
 
 def test_the_whole_is_read_once_and_several_parts_at_once(server, tmp_path):
@@ -142,10 +142,9 @@ def double(path):
 DAMAGES = (spoil_in_range, cut, lose_summary, lie_on_places, lie_on_indexes, double)
 
 
-@pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.ZSTD])
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_log_gives_what_it_gives_on_a_disk(server, tmp_path, damage, compression):
-    path = long_log(tmp_path / "drive.mcap", compression=compression)
+def test_a_damaged_log_gives_what_it_gives_on_a_disk(server, tmp_path, damage):
+    path = long_log(tmp_path / "drive.mcap", compression=CompressionType.ZSTD)
     damage(path)
     _, far = tables(server.url("drive.mcap"), tmp_path / "far", **RANGE)
     assert far == tables(path, tmp_path / "near", **RANGE)[1]
@@ -191,7 +190,7 @@ def test_what_is_expected_or_not_is_read_right_and_little_is_asked_for_ahead():
     chance = random.Random(0)
     with Server() as server:
         file = open_source(server.url("whole/a.mcap")).file
-        for _ in range(60):
+        for _ in range(12):
             begins = [chance.randrange(len(CONTENT)) for _ in range(chance.randrange(50))]
             parts = [(begin, begin + chance.choice((0, 300, 3_000_000))) for begin in begins]
             file.expect(parts)

@@ -220,6 +220,8 @@ class Scan:
         if chunk.cut:
             self.gaps.append(Gap(chunk.offset, chunk.data_end, "the file ends inside a chunk"))
         if self.summary.statistics is None:  # while it is uncompressed
+            if len(self.chunks) == 1:
+                self.source.expect([(chunk.data_offset, len(self.source))])
             with suppress(BadRecord):
                 self.look(len(self.chunks) - 1)
 
