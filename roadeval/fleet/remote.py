@@ -16,9 +16,9 @@ import re
 import shutil
 import zlib
 from base64 import b64encode
-from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, wait
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cache, partial
 from os import PathLike
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from obstore import ObjectMeta
 
 Answer = TypeVar("Answer")
-Bounds = TypeVar("Bounds", bound=tuple[Any, ...])
 
 PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
@@ -160,12 +159,13 @@ class _FileState(NamedTuple):
         return self.size != other.size or (one != two and "" not in (one, two)) or is_later
 
 
-class _Part(NamedTuple):
-    """Bytes of a file that were asked for."""
+@dataclass(slots=True)
+class _Part:
+    """Bytes of a file, and the server's answer if it was asked for them."""
 
     begin: int
     end: int
-    answer: Future[tuple[_FileState, bytearray]]
+    answer: Future[tuple[_FileState, bytearray]] | None = None
 
 
 class _RemoteFile(FarFile):
@@ -176,12 +176,10 @@ class _RemoteFile(FarFile):
         tag = state.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
         place.traffic.total = self._size
-        self._tail: _Part | None = None
-        self._kept = deque[_Part](maxlen=AT_ONCE)
-        """Parts that were read, or passed by."""
-        self._ahead: list[_Part] = []
-        self._expected: list[tuple[int, int]] = []
-        """Parts that will be asked for after those."""
+        self._parts: list[_Part] = []
+        """Parts that were read or passed by, and then those that are expected."""
+        self._next = 0
+        """The position of the first of these that is expected."""
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + (self._size if whence == os.SEEK_END else 0)
@@ -197,49 +195,51 @@ class _RemoteFile(FarFile):
         return bytes(content)
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
-        self._kept += self._ahead
-        self._ahead, self._expected = [], []
+        asked, expected = [part for part in self._parts if part.answer], list[_Part]()
         for begin, stop in dict.fromkeys(parts):
-            end = min(stop, self._size - TAIL)
-            if begin >= end or all(_holding(self._kept, at) for at in (begin, end - 1)):
+            end = min(stop, self._size)
+            ends = begin, end - 1
+            if begin >= end or all(any(p.begin <= at < p.end for p in asked) for at in ends):
                 continue
-            first, last = self._expected[-1] if self._expected else (end, end)
-            if first <= begin <= last + PART and end <= first + PIECE:
-                self._expected[-1] = first, max(last, end)
+            last = expected[-1] if expected else _Part(end, end)
+            if last.begin <= begin <= last.end + PART and end <= last.begin + PIECE:
+                last.end = max(last.end, end)
             else:
-                self._expected += [(at, min(at + PIECE, end)) for at in range(begin, end, PIECE)]
+                expected += [_Part(at, min(at + PIECE, end)) for at in range(begin, end, PIECE)]
+        self._parts, self._next = asked + expected, len(asked)
         self._read_ahead()
 
     def _read_ahead(self) -> None:
-        count = AT_ONCE - len(self._ahead)
-        self._ahead += [self._ask_for(*part) for part in self._expected[:count]]
-        del self._expected[:count]
+        """Forget parts that were passed long ago, and ask for those that are expected soon."""
+        del self._parts[: max(self._next - AT_ONCE, 0)]
+        self._next = min(self._next, AT_ONCE)
+        for part in self._parts[: self._next + AT_ONCE]:
+            self._ask_for(part)
 
     def _part(self, begin: int, end: int) -> _Part:
         """Return a part that holds a byte, and perhaps those up to another."""
-        if begin >= (tail := max(self._size - TAIL, 0)):
-            self._tail = self._tail or self._ask_for(tail, self._size)
-            return self._tail
-        if part := _holding(reversed(self._kept), begin):
-            return part
-        if part := _holding(self._ahead, begin):
-            count = self._ahead.index(part) + 1
-            self._kept += self._ahead[:count]
-            del self._ahead[:count]
-            self._read_ahead()
-            return part
-        if expected := _holding(self._expected, begin):
-            self._expected.remove(expected)
-        # One byte more, as the last byte of a chunk is read alone.
-        part = self._ask_for(*(expected or (begin, min(max(end + 1, begin + PART), self._size))))
-        if part.end - part.begin <= PIECE:
-            self._kept.append(part)
+        place = next(
+            (n for n, part in enumerate(self._parts) if part.begin <= begin < part.end), -1
+        )
+        if 0 <= place < self._next + AT_ONCE:
+            part = self._parts[place]
+            self._next = max(self._next, place + 1)
+        else:
+            # The file's end is read at once, and a byte more, as a chunk's last one is read alone.
+            first, last = min(begin, max(self._size - TAIL, 0)), max(end + 1, begin + PART)
+            part = self._parts.pop(place) if place >= 0 else _Part(first, min(last, self._size))
+            if part.end - part.begin <= PIECE:
+                self._parts.insert(self._next, part)
+                self._next += 1
+        self._read_ahead()
         return part
 
-    def _ask_for(self, begin: int, end: int) -> _Part:
-        self._place.traffic.requests += 1
-        self._place.traffic.bytes += end - begin
-        return _Part(begin, end, in_thread(partial(self._fetch, begin, end)))
+    def _ask_for(self, part: _Part) -> Future[tuple[_FileState, bytearray]]:
+        if part.answer is None:
+            self._place.traffic.requests += 1
+            self._place.traffic.bytes += part.end - part.begin
+            part.answer = in_thread(partial(self._fetch, part.begin, part.end))
+        return part.answer
 
     def _fetch(self, begin: int, end: int) -> tuple[_FileState, bytearray]:
         import obstore
@@ -257,7 +257,7 @@ class _RemoteFile(FarFile):
         """Wait for a part, and return its bytes."""
         where = public_source(self._place.url)
         try:
-            state, content = _wait_for(self._place.url, part.answer)
+            state, content = _wait_for(self._place.url, self._ask_for(part))
         except FleetError as error:
             if error.problem != NO_PARTS:
                 raise
@@ -273,13 +273,8 @@ class _RemoteFile(FarFile):
 
     def close(self) -> None:
         # A thread in the midst of an answer may outlive the interpreter.
-        wait([part.answer for part in self._ahead], _POLL_S)
-        self._expected, self._ahead, self._tail = [], [], None
-        self._kept.clear()
-
-
-def _holding(parts: Iterable[Bounds], at: int) -> Bounds | None:
-    return next((part for part in parts if part[0] <= at < part[1]), None)
+        wait([part.answer for part in self._parts if part.answer], _POLL_S)
+        self._parts, self._next = [], 0
 
 
 def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:

@@ -536,9 +536,9 @@ class FrameStream:
 
     def parts(self) -> Iterator[Sequence[tuple[int, int]]]:
         """Yield the bytes of the log that hold each frame and its labels, by their log times."""
-        images, labels = self.selection.camera.images, self.selection.labels.values()
-        topics = [s.pictures for s in labels if isinstance(s.pictures, TopicReader)]
-        readers = [images, *(topic for topic in topics if topic.is_beside(images))]
+        in_log = (source for source in self.selection.labels.values() if not source.digest)
+        topics = [self.selection.camera.images, *(source.pictures for source in in_log)]
+        readers = [t for t in topics if isinstance(t, TopicReader) and len(t)]
         yield from zip(*(reader.parts(self.log_times) for reader in readers), strict=True)
 
     @property

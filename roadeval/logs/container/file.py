@@ -160,8 +160,7 @@ class Container:
         If a chunk has no checksum, its first bytes take part. A `BadRecord` if the disk fails.
         """
         parts = [b"%d %d" % (len(self.source), self.scan.data_crc)]
-        begins = [chunk.data_offset for chunk in self.chunks if not chunk.crc]
-        self.source.expect((begin, begin + 4096) for begin in begins)
+        self.source.expect((c.data_offset, c.data_offset + 4096) for c in self.chunks if not c.crc)
         for chunk, index in zip(self.chunks, self.scan.indexes, strict=True):
             parts.append(b"%d %d %d %d" % (chunk.offset, chunk.size, chunk.data_size, chunk.crc))
             if not chunk.crc:

@@ -36,7 +36,7 @@ MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
-CHUNK_BEGIN: Final = CHUNK_HEAD.size + 64 + 8 + 4
+CHUNK_BEGIN: Final = HEAD.size + CHUNK_HEAD.size + 64 + 8 + 4
 """Bytes of a chunk that hold its head; the name of a compression has at most 64, or is damaged."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
@@ -212,7 +212,7 @@ def parse(opcode: int, body: Buffer) -> Any:
 
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
     """Read a chunk's head; its length of the data may contradict the length of the record."""
-    head = source[record.body : record.body + CHUNK_BEGIN]
+    head = source[record.body : record.body - HEAD.size + CHUNK_BEGIN]
     with suppress(struct.error):
         start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
         at = CHUNK_HEAD.size + name_length

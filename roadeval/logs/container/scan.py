@@ -36,7 +36,6 @@ _CANDIDATE: Final = re.compile(
 )
 """The head of a record that is shorter than 4 GiB or was never ended, or a log's first bytes."""
 _HEADS: Final = HEAD.size + MESSAGE_HEAD.size
-_CHUNK_BEGIN: Final = HEAD.size + records.CHUNK_BEGIN
 _NOT_IN_CHUNKS: Final = (CHUNK, records.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that never lie inside a chunk, unlike messages and their descriptions."""
 RECORDS: Final = 1 << 18
@@ -101,7 +100,7 @@ class Scan:
             self.gaps.append(Gap(0, len(MAGIC), "the file does not begin as it should", False))
         index_ends, most = self.summary.index_ends, records.IN_MEMORY
         self.source.expect(  # the indexes of each chunk, and the head of the next one
-            (chunk.data_end, min(index_ends[at], chunk.data_end + most) + _CHUNK_BEGIN)
+            (chunk.data_end, min(index_ends[at], chunk.data_end + most) + records.CHUNK_BEGIN)
             for at, chunk in sorted(self.summary.chunks.items())
         )
         record = Record(BORDER, 0, 0, len(MAGIC) if begun else 0)

@@ -322,10 +322,6 @@ class TopicReader:
                 begin, data = container.source.begin, container.chunks[chunk]
                 yield begin + data.data_offset, begin + data.data_end
 
-    def is_beside(self, other: TopicReader) -> bool:
-        """Return whether there are messages, in the same files as those of another topic."""
-        return len(self) > 0 and self._files is other._files
-
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
         """Say which bytes of its file will be read next, see `FileBytes.expect`."""
         self._files[0].source.expect(parts)

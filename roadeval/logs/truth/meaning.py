@@ -482,8 +482,8 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
     if isinstance(pictures, TopicReader) and not pictures.is_small:
         first = first[: sum(pictures.chunks_of(first[: n + 1]) <= 2 for n in first)]
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
-    for count, position in enumerate(positions := sorted({*first, *spread})):
-        if count == 1 and isinstance(pictures, TopicReader):  # often the first one does
+    for looked, position in enumerate(positions := sorted({*first, *spread})):
+        if looked == 1 and isinstance(pictures, TopicReader):  # often the first one does
             pictures.expect(pictures.parts(pictures.log_times[positions]))
         with suppress(FrameError):
             picture = pictures.picture(position)
