@@ -196,14 +196,16 @@ class _RemoteFile(FarFile):
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
         asked, expected = [part for part in self._parts if part.answer], list[_Part]()
+        held = sorted((part.begin, part.end) for part in asked)
         for begin, stop in dict.fromkeys(parts):
-            end = min(stop, self._size)
-            ends = begin, end - 1
-            if begin >= end or all(any(p.begin <= at < p.end for p in asked) for at in ends):
+            end, held_until = min(stop, self._size), begin
+            for first, last in held:
+                held_until = last if first <= held_until < last else held_until
+            if held_until >= end:
                 continue
-            last = expected[-1] if expected else _Part(end, end)
-            if last.begin <= begin <= last.end + PART and end <= last.begin + PIECE:
-                last.end = max(last.end, end)
+            before = expected[-1] if expected else _Part(end, end)
+            if before.begin <= begin <= before.end + PART and end <= before.begin + PIECE:
+                before.end = max(before.end, end)
             else:
                 expected += [_Part(at, min(at + PIECE, end)) for at in range(begin, end, PIECE)]
         self._parts, self._next = asked + expected, len(asked)
