@@ -51,9 +51,9 @@ PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 PART: Final = 64 << 10
-"""Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
+"""Fewest bytes of a part that nobody expected, and most between two that are read as one."""
 TAIL: Final = 128 << 10
-"""Bytes at the end that are read at once, and kept: the summary of a log of one gigabyte."""
+"""Bytes at the end that are read at once: the summary of a log of one gigabyte."""
 AT_ONCE: Final = 16
 """Parts that are read ahead at once; as many that were read are kept."""
 PIECE: Final = 1 << 20
