@@ -220,9 +220,7 @@ class _RemoteFile(FarFile):
 
     def _part(self, begin: int, end: int) -> _Part:
         """Return a part that holds a byte, and perhaps those up to another."""
-        place = next(
-            (n for n, part in enumerate(self._parts) if part.begin <= begin < part.end), -1
-        )
+        place = next((n for n, p in enumerate(self._parts) if p.begin <= begin < p.end), -1)
         if 0 <= place < self._next + AT_ONCE:
             part = self._parts[place]
             self._next = max(self._next, place + 1)

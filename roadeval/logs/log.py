@@ -63,8 +63,7 @@ class Traffic:
     """The size of the file."""
 
     def __str__(self) -> str:
-        amount = f"{self.bytes / 1e6:.1f} of {self.total / 1e6:.1f} MB"
-        return f"{amount} in {counted(self.requests, 'request')}"
+        return f"{self.bytes / 1e6:.1f} of {self.total / 1e6:.1f} MB in {self.requests:,} requests"
 
 
 @dataclass(frozen=True, eq=False)
