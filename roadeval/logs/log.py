@@ -55,10 +55,15 @@ from roadeval.runtime.text import visible
 
 @dataclass(slots=True)
 class Traffic:
-    """The requests to a server so far, and the bytes of files in its answers."""
+    """The requests to a server so far, and the bytes of a file in its answers."""
 
     requests: int = 0
     bytes: int = 0
+    total: int = 0
+    """The size of the file."""
+
+    def __str__(self) -> str:
+        return f"{self.bytes / 1e6:.1f} of {self.total / 1e6:.1f} MB in {self.requests:,} requests"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +93,12 @@ def open_log(
     """
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
-        opened, source, path = path.file, path.source, path.path
+        traffic, opened, source, path = path.traffic, path.file, path.source, path.path
         if problem := content_problem(path, opened):
             raise LogError(problem, where=path)
         files, damage = [path], list[Damage]()
     else:
-        opened, source, path = None, str(path), Path(path)
+        traffic, opened, source, path = None, None, str(path), Path(path)
         files, damage = files_of(path)
     states: dict[Path, tuple[int, ...]] = {}
     for file in files if opened is None else ():
@@ -129,7 +134,7 @@ def open_log(
         raise LogError(str(error), where=path) from error
     name = path.stem if path.is_file() or opened is not None else path.resolve().name
     facts = path, source, visible(name), config, topics, readers, containers, damage, states
-    return Log(*facts, by_summary=outline is not None)
+    return Log(*facts, by_summary=outline is not None, traffic=traffic)
 
 
 def _state(facts: os.stat_result) -> tuple[int, ...]:
@@ -163,6 +168,8 @@ class Log:
     """Other logs that hold labels; they are closed with this one."""
     by_summary: bool = False
     """Whether of its messages only the first ones are there."""
+    traffic: Traffic | None = None
+    """The requests and bytes that a log elsewhere has cost so far; None for one on a disk."""
 
     @cached_property
     def start_ns(self) -> int:

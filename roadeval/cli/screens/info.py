@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
-from roadeval.data.words import counted, timestamp
+from roadeval.data.words import timestamp
 from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
@@ -28,10 +28,9 @@ def show(log: LogDescription, out: Console) -> None:
     length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
     console.say(f"{log.path}: {length}, {size}{unverified}", out)
     if read := log.traffic:
-        what = " from the log's summary and first messages" if log.by_summary else ""
-        amount = f"{counted(read.requests, 'request')}, {read.bytes / 1e6:.1f} MB"
+        what = ": the log's summary and first messages" if log.by_summary else ""
         rest = "; --verify checks every chunk" if log.by_summary else ""
-        console.say(f"read{what} in {amount}{rest}", out)
+        console.say(f"read {read}{what}{rest}", out)
     out.print()
     tables.show_table(_topic_table(log.topics), out)
     for topic in log.topics:

@@ -38,6 +38,8 @@ def show(outcome: Outcome, out: Console) -> None:
     facts = outcome.facts
     cameras = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
     out.print(f"{facts.drive.name}: {cameras}{account(facts.frames)}")
+    if outcome.traffic:
+        out.print(f"read {outcome.traffic}")
     out.print()
     if facts.totals:
         tables.show([*_score_tables(facts, outcome.metres)], out)

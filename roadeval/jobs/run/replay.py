@@ -20,7 +20,7 @@ from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
-from roadeval.logs.log import Log, open_log
+from roadeval.logs.log import Log, Traffic, open_log
 from roadeval.logs.writing.writer import SidecarWriter
 from roadeval.recording.layout import RecordRule
 from roadeval.report.images import ExampleFrame
@@ -57,6 +57,8 @@ class Outcome:
     """The rows of ``metres``; empty of a rig, and of a camera that is not known."""
     errors: tuple[float, ...] = ()
     """ERR of the focus frame by frame; empty of a rig."""
+    traffic: Traffic | None = None
+    """The requests and bytes that a log elsewhere has cost; None for one on a disk."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -159,6 +161,7 @@ def _replay_log(
         tracebacks=tracebacks,
         metres=ended[0].metres if len(ended) == 1 else (),
         errors=tuple(of_focus[TESTED].dropna()) if len(ended) == 1 else (),
+        traffic=log.traffic,
     )
 
 
