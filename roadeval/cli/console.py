@@ -80,10 +80,12 @@ class _TrimmedStream:
         self._stream = stream
 
     def write(self, text: str) -> int:
+        """Write a text without the spaces at the ends of its lines."""
         with _output_errors():
             return self._stream.write(_PADDING.sub(r"\1", text))
 
     def flush(self) -> None:
+        """Write what is still in memory."""
         with _output_errors():
             self._stream.flush()
 

@@ -312,7 +312,15 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     """
     first_of: dict[tuple[str, str], DriveEntry] = {}
     bare: tuple[Any, ...] = (None, {}, {})
-    for entry in (entry for word in words for entry in _drives_of(word)):
+    entries: list[DriveEntry] = []
+    for word in words:
+        with reading(visible(word), FleetError):
+            path = Path(word)
+            if is_url(word) or path.suffix != MANIFEST or not path.is_file():
+                entries += map(entry_of, _sources(word, Path()))
+            else:
+                entries += read_manifest(path)
+    for entry in entries:
         place = entry.source if entry.path is None else os.path.realpath(entry.path)
         first = first_of.setdefault((place, entry.camera), entry)
         if first.description == bare != entry.description:
@@ -323,15 +331,6 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     if not first_of:
         raise FleetError("no drive found", remedy="name logs, folders of logs, URLs or a manifest")
     return name_cameras([*first_of.values()])
-
-
-def _drives_of(word: str) -> Iterator[DriveEntry]:
-    with reading(visible(word), FleetError):
-        path = Path(word)
-        if is_url(word) or path.suffix != MANIFEST or not path.is_file():
-            yield from map(entry_of, _sources(word, Path()))
-        else:
-            yield from read_manifest(path)
 
 
 def _sources(word: str, base: Path) -> list[str]:

@@ -77,7 +77,12 @@ def holding(
     outputs = [*paths, *([folder] if folder else [])]
     # For a loop of links pathlib raises an error of its own.
     places = [os.path.realpath(path) for path in outputs]
-    taken = {os.path.realpath(place) for path in inputs if path for place in _places(Path(path))}
+    taken = set[str]()
+    for path in (Path(file) for file in inputs if file):
+        names: Iterable[str] = FILES if is_fleet(path) else ()
+        if not names and (path / SUMMARY).is_file():
+            names = names_of_results(path / SUMMARY)
+        taken |= {os.path.realpath(file) for file in (path, *(path / name for name in names))}
     for number, path in enumerate(outputs):
         earlier = places[:number] if path is folder else {*places[:number], *taken}
         if places[number] in earlier:
@@ -89,15 +94,6 @@ def holding(
         if folder:
             certain.append(_claim(claims, folder, claim_folder(folder, CONTENT)))
         yield all(certain)
-
-
-def _places(path: Path) -> Iterator[Path]:
-    """Yield the path of an input and of the files by which a folder is a result or a fleet."""
-    yield path
-    if is_fleet(path):
-        yield from (path / name for name in FILES)
-    elif (path / SUMMARY).is_file():
-        yield from (path / name for name in names_of_results(path / SUMMARY))
 
 
 def _claim(claims: ExitStack, path: Path, claim: AbstractContextManager[bool]) -> bool:

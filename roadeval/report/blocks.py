@@ -178,14 +178,12 @@ def blocks_as_markdown(blocks: Iterable[Block]) -> str:
                 lines += [*(f"- {as_markdown(plain(item))}" for item in block.items), ""]
             case Table():
                 lines += [as_markdown(block.caption), ""] if block.caption else []
-                lines += [*_table_lines(block), ""]
+                places = range(len(block.columns))
+                sides = ["---" if p in block.text_columns else "---:" for p in places]
+                rows = [[as_markdown(plain(cell)) for cell in row] for row in block.rows]
+                lines += [f"| {' | '.join(cells)} |" for cells in (block.columns, sides, *rows)]
+                lines.append("")
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _table_lines(table: Table) -> list[str]:
-    sides = ["---" if p in table.text_columns else "---:" for p in range(len(table.columns))]
-    rows = [[as_markdown(plain(cell)) for cell in row] for row in table.rows]
-    return [f"| {' | '.join(cells)} |" for cells in (table.columns, sides, *rows)]
 
 
 def plain(item: Cell | Reason | str) -> str:

@@ -190,16 +190,8 @@ def thin(series: Series, most: int = POINTS) -> Series:
     size = -(-len(series.x) // most)
     if size <= 1:
         return series
-    places = range(0, len(series.x), size)
-    return replace(
-        series,
-        x=[series.x[place] for place in places],
-        y=[_mean(series.y[place : place + size]) for place in places],
-        low=(),
-        high=(),
-    )
-
-
-def _mean(values: Sequence[float]) -> float:
-    defined = [value for value in values if math.isfinite(value)]
-    return sum(defined) / len(defined) if defined else math.nan
+    means = []
+    for place in range(0, len(series.x), size):
+        values = [value for value in series.y[place : place + size] if math.isfinite(value)]
+        means.append(sum(values) / len(values) if values else math.nan)
+    return replace(series, x=[*series.x[::size]], y=means, low=(), high=())

@@ -52,16 +52,28 @@ def document(
     the result's label; None: no commands.
     """
     labels = [result.label for result in comparison.results]
+    sizes = [
+        f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
+        if result.drive is None
+        else f"{result.label}: {result.frames} frames of {result.drive}"
+        for result in comparison.results
+    ]
+    figures: list[Block] = []
+    if finals := [row for row in _changed(comparison) if row.final]:
+        figures.append(blocks.Figure(charts.changes(finals), caption("change of rates")))
+    if over_drive:
+        figures.append(Heading("Over the drive", 2))
+        figures.append(blocks.Figure(over_drive, caption("common frames", rate=TESTED)))
     return blocks.Report(
         kicker="roadeval comparison",
         title=listing(labels),
-        subtitle="; ".join(map(_subtitle, comparison.results)),
+        subtitle="; ".join(sizes),
         footer=f"comparison of {listing(labels)}",
         blocks=[
             Heading("What changed"),
             *overview(comparison, judgements),
             *_warnings(comparison),
-            *_figures(comparison, over_drive),
+            *figures,
             *_details(comparison, inspect),
         ],
         keywords=["road recognition", "comparison"],
@@ -116,13 +128,6 @@ def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> lis
     }.items():
         drawn[f"Change of {name} by {unit}: orange is worse, blue is better."] = changes(rows)
     return [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
-
-
-def _subtitle(result: compare.ComparedResult) -> str:
-    """Return the frames or drives of a result in words."""
-    if result.drive is not None:
-        return f"{result.label}: {result.frames} frames of {result.drive}"
-    return f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
 
 
 def _warnings(comparison: Comparison) -> Iterator[Block]:
@@ -214,15 +219,6 @@ def _table(rows: Sequence[Row], columns: Columns, legend: str = "") -> Table:
         caption=legend,
         small=True,
     )
-
-
-def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Block]:
-    finals = [row for row in _changed(comparison) if row.final]
-    if finals:
-        yield blocks.Figure(charts.changes(finals), caption("change of rates"))
-    if over_drive:
-        yield Heading("Over the drive", 2)
-        yield blocks.Figure(over_drive, caption("common frames", rate=TESTED))
 
 
 def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator[Block]:

@@ -35,6 +35,10 @@ def document(history: History) -> blocks.Report:
     runs = history.runs
     drives = counted(runs[-1].drives, "drive")
     lost = [BulletList("Left out", history.lost, "warning")] if history.lost else []
+    columns, rows = ["run", "labels", "drives", "frames", "result"], list[Sequence[Cell | str]]()
+    for run in reversed(runs):
+        labels = ", ".join(f"{name}={value}" for name, value in run.origin.labels.items())
+        rows.append([run.name, labels, number(run.drives), number(run.frames), run.paths[0]])
     return blocks.Report(
         kicker="roadeval history",
         title=f"{counted(len(runs), 'run')}: {history.focus}",
@@ -53,7 +57,7 @@ def document(history: History) -> blocks.Report:
             rates_table(sorted(history.lines, key=lambda line: line.variant != history.focus)),
             _drives_table(history),
             Heading("The runs"),
-            _runs_table(history),
+            Table(columns, rows, text_columns=(0, 1, 4), small=True, find="Find runs:"),
         ],
         keywords=["road recognition", "history"],
     )
@@ -161,12 +165,3 @@ def _drives_table(history: History) -> Details:
     columns = ["drive", "first %", "last %", "over the runs"]
     table = Table(columns, rows, text_columns=(0, 3), small=True, find="Find drives:")
     return Details(f"{TESTED} of {history.focus} on each drive", [table], on_paper=False)
-
-
-def _runs_table(history: History) -> Table:
-    rows: Rows = []
-    for run in reversed(history.runs):
-        labels = ", ".join(f"{name}={value}" for name, value in run.origin.labels.items())
-        rows.append([run.name, labels, number(run.drives), number(run.frames), run.paths[0]])
-    columns = ["run", "labels", "drives", "frames", "result"]
-    return Table(columns, rows, text_columns=(0, 1, 4), small=True, find="Find runs:")

@@ -77,21 +77,21 @@ class History:
     @property
     def standing(self) -> list[Event]:
         """The events that made the focus worse and that no later run has undone."""
-        return [event for event in self.events if _stands(event.first, self.focus)]
+        events = []
+        for event in self.events:
+            line, step = event.first.line, event.first.step
+            # Steps tell it: single runs are noisy, and the last one may have no level.
+            since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
+            is_level = (line.title, line.variant) == (TESTED, self.focus) and step.kind != "outlier"
+            if is_level and event.first.difference.mean > 0 and since > step.change / 2:
+                events.append(event)
+        return events
 
     @property
     def last_good(self) -> RunFacts:
         """The newest run that was scored and that no standing event has made worse."""
         before = self.runs[: min((event.run for event in self.standing), default=len(self.runs))]
         return ([run for run in before if run.drives] or before)[-1]
-
-
-def _stands(change: LineChange, focus: str) -> bool:
-    line, step, rise = change.line, change.step, change.difference.mean
-    # Steps tell it: single runs are noisy, and the last one may have no level.
-    since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
-    is_level = line.title == TESTED and line.variant == focus and step.kind != "outlier"
-    return bool(is_level and rise > 0 and since > step.change / 2)
 
 
 def group_changes(changes: Sequence[LineChange], focus: str) -> list[Event]:

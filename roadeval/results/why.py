@@ -43,7 +43,13 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
     """Yield what is confirmed about a variant: of its classes, its conditions, its disturbances."""
     rows = only(classes, variant=variant)
     for kind, sentence in describe_classes(rows, variant).items():
-        yield Reason(sentence, _worst_frames(rows, kind) if isinstance(facts, Facts) else [])
+        frames: list[int] = []
+        if isinstance(facts, Facts):  # those with most false road of a class, or most missed road
+            is_kind = rows["truth"] == ("other" if kind == "false" else "road")
+            wrong = rows["road"] if kind == "false" else rows["pixels"] - rows["road"]
+            most = wrong.where(is_kind, -1).to_numpy().argmax()
+            frames = [*map(int, str(rows["worst"].iloc[most]).split())]
+        yield Reason(sentence, frames)
     # Regions tell already if one part of the image is worse than the rest.
     conditional = (confirmed for confirmed in facts.slices.get(variant, []) if confirmed.conditions)
     for confirmed in islice(conditional, 1):
@@ -51,14 +57,6 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
     changes = facts.disturbances.get(variant, {})
     if any(is_significant(change.difference) for change in changes.values()):
         yield Reason(describe_disturbances({variant: changes}, variant), [])
-
-
-def _worst_frames(classes: pd.DataFrame, kind: str) -> list[int]:
-    """Return the frames with most false road of a class, or with most missed road."""
-    is_kind = classes["truth"] == ("other" if kind == "false" else "road")
-    wrong = classes["road"] if kind == "false" else classes["pixels"] - classes["road"]
-    most = wrong.where(is_kind, -1).to_numpy().argmax()
-    return [*map(int, str(classes["worst"].iloc[most]).split())]
 
 
 NAMED: Final = 3

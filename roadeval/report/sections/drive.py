@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.captions import caption, note
@@ -67,7 +65,14 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         filter_too = "the filter and " * (FILTERED in findings.facts.finals)
         yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
-        yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
+        changes = [effect.rates[TESTED] for effect in effects]
+        about = [caption("effects", baseline=BASELINE)]
+        if with_interval := [change for change in changes if change.low is not None]:
+            confidence = percent(with_interval[0].confidence, 0)
+            about.append(caption("intervals", confidence=confidence))
+        reasons = dict.fromkeys(change.none_because for change in changes if change.low is None)
+        about += [caption("no interval", reason=reason) for reason in reasons if reason]
+        yield Text(" ".join(filter(None, [*about, correction(changes)])), "note")
     pairs = tables.changes(findings.table("frames"), FILTERED, UNFILTERED)
     of_filter = (e.rates[TESTED] for e in effects if (e.variant, e.base) == (FILTERED, UNFILTERED))
     change = next(of_filter, None) if len(pairs) else None
@@ -84,18 +89,6 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
         yield Details("The filter, frame by frame", [figure])
     yield from _over_time(findings)
-
-
-def _about_effects(changes: Sequence[Difference]) -> str:
-    """Return the note on a table of effects: its baseline, intervals and corrections."""
-    sentences = [caption("effects", baseline=BASELINE)]
-    with_interval = [change for change in changes if change.low is not None]
-    if with_interval:
-        confidence = percent(with_interval[0].confidence, 0)
-        sentences.append(caption("intervals", confidence=confidence))
-    reasons = dict.fromkeys(change.none_because for change in changes if change.low is None)
-    sentences += [caption("no interval", reason=reason) for reason in reasons if reason]
-    return " ".join(filter(None, [*sentences, correction(changes)]))
 
 
 def _over_time(findings: Findings) -> Iterator[Block]:
@@ -211,22 +204,17 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         text_columns=(0, 1),
         small=True,
     )
-    blocks = [table, note("perfect stages"), *_perfect_filter(findings, rows)]
-    yield Details("If a stage were perfect", blocks)
-
-
-def _perfect_filter(findings: Findings, oracles: Sequence[Mapping[str, Any]]) -> Iterator[Text]:
-    """Yield whether a filter that finds all shadow, and nothing else, would help."""
-    if not {FILTERED, UNFILTERED} <= findings.facts.totals.keys():
-        return
-    without = findings.total(UNFILTERED)
-    for row in oracles:
-        is_filter = row["oracle"] not in findings.facts.totals[FILTERED]
-        if row["variant"] == FILTERED and is_filter and row["frames"] == without["frames"]:
+    blocks = [table, note("perfect stages")]
+    totals = findings.facts.totals
+    for row in rows if {FILTERED, UNFILTERED} <= totals.keys() else ():
+        is_filter = row["variant"] == FILTERED and row["oracle"] not in totals[FILTERED]
+        without = findings.total(UNFILTERED)
+        if is_filter and row["frames"] == without["frames"]:
             helps = row[TESTED] <= without[TESTED]
             meaning = caption("perfect filter helps" if helps else "perfect filter harms")
             errors = {"perfect": percent(row[TESTED]), "without": percent(without[TESTED])}
-            yield note("perfect filter", **errors, meaning=meaning)
+            blocks.append(note("perfect filter", **errors, meaning=meaning))
+    yield Details("If a stage were perfect", blocks)
 
 
 def _heat_maps(maps: Mapping[str, Floats]) -> ImageGrid:

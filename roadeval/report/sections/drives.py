@@ -79,18 +79,6 @@ def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
         yield best, f"What {best.variant}{which} gains over {best.base}"
 
 
-def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
-    """Return the differences of each drive by base: of the focus, if it has any, or of another."""
-    differences = {}
-    for base in BASES:
-        rows = only(findings.effects, base=base)
-        if variants := values_of(rows, "variant"):
-            focus = findings.facts.focus
-            rows = only(rows, variant=focus if focus in variants else variants[0])
-            differences[base] = rows.set_index("drive")["mean"]
-    return differences
-
-
 def table(findings: FleetFolder) -> Iterator[Block]:
     """Yield the table of all drives, to sort and to search."""
     yield Heading("All drives")
@@ -170,11 +158,14 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "tags": [tags.get(drive, "") for drive in rows.index],
         "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
         **{rate: [*map(percent, scores[rate])] for rate in _SHOWN},
-        **{
-            f"against {base}": [*map(points, changes.reindex(rows.index))]
-            for base, changes in _differences(findings).items()
-        },
     }
+    for base in BASES:  # differences of the focus, if it has any, or of another variant
+        effects = only(findings.effects, base=base)
+        if variants := values_of(effects, "variant"):
+            focus = findings.facts.focus
+            effects = only(effects, variant=focus if focus in variants else variants[0])
+            changes = effects.set_index("drive")["mean"].reindex(rows.index)
+            columns[f"against {base}"] = [*map(points, changes)]
     unused = [title for title in ("group", "tags") if not any(columns[title])]
     unused += [] if worst is None else ["state", "group"]
     columns = {title: cells for title, cells in columns.items() if title not in unused}
@@ -187,7 +178,10 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
 
 
 def missing(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the drives that failed by reason, those without truth, and those with losses."""
+    """Yield the drives that failed by reason, those without truth, and those with losses.
+
+    The most frequent reason is the first.
+    """
     drives = findings.drives
     parts = {
         "Drives that failed": only(drives, status=FAILED),
@@ -197,26 +191,21 @@ def missing(findings: FleetFolder) -> Iterator[Block]:
     if any(map(len, parts.values())):
         yield Heading("What is missing")
     for title, rows in parts.items():
-        if len(rows):
-            yield Heading(f"{title}: {number(len(rows))}", 2)
-            yield from _reasons(findings, rows)
-
-
-def _reasons(findings: FleetFolder, rows: pd.DataFrame) -> Iterator[Block]:
-    """Tabulate the drives by reason, the most frequent reason first."""
-    ranked = sorted(by_reason(findings, rows).items(), key=lambda reason: -len(reason[1]))
-    yield Table(
-        ["drives", "which", "reason"],
-        [
-            [number(len(names)), first_of(names, OF_ONE_REASON), reason]
-            for reason, names in ranked[:NAMED]
-        ],
-        text_columns=(0, 1, 2),
-        small=True,
-    )
-    if len(ranked) > NAMED:
-        more = sum(len(names) for _, names in ranked[NAMED:])
-        yield note("further reasons", count=number(more))
+        if not len(rows):
+            continue
+        yield Heading(f"{title}: {number(len(rows))}", 2)
+        ranked = sorted(by_reason(findings, rows).items(), key=lambda reason: -len(reason[1]))
+        yield Table(
+            ["drives", "which", "reason"],
+            [
+                [number(len(names)), first_of(names, OF_ONE_REASON), reason]
+                for reason, names in ranked[:NAMED]
+            ],
+            text_columns=(0, 1, 2),
+            small=True,
+        )
+        if more := sum(len(names) for _, names in ranked[NAMED:]):
+            yield note("further reasons", count=number(more))
 
 
 def by_reason(findings: FleetFolder, rows: pd.DataFrame) -> dict[str, list[str]]:
