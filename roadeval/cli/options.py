@@ -180,7 +180,7 @@ def _help(meaning: str, kind: Any, default: Any) -> str:
 def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:
     """Return the type of what is typed for a value of a type, and the function that reads it.
 
-    ``names`` is the flag and the placeholder of the name in its value, as ``--net NAME``.
+    ``names`` is the flag and the placeholder of the name in its value, such as ``--net NAME``.
     """
     kind = _without_metadata(hint)
     match get_origin(kind):

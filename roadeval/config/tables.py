@@ -109,7 +109,7 @@ def override(settings: Any, values: Any, table: str) -> Any:
     _check(values, settings, table)
     merged = _merge(dataclasses.asdict(settings), values)
     try:
-        # In JSON a strict check accepts a list for a tuple, but for a number neither text nor true.
+        # Of JSON a strict check accepts a list as a tuple, but neither text nor true as a number.
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:

@@ -79,7 +79,7 @@ Masks = Mapping[str, MaskSettings]
 
 @dataclass(frozen=True)
 class Variant:
-    """A named method: its pipeline, and the preset to which its settings are changes."""
+    """A named method: its pipeline, and the preset that its settings change."""
 
     name: str
     pipeline: Pipeline

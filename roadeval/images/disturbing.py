@@ -27,8 +27,8 @@ Light = npt.NDArray[np.float32]
 """Linear light, ``(H, W, 3)``, or a number a pixel, ``(H, W)``."""
 
 FAR, SKY = 80.0, 300.0
-"""Metres beyond which what stands on the ground hides it (1/d^2 = 1/ground^2 + 1/FAR^2), and to
-the sky."""
+"""Metres beyond which objects hide the ground (1/d^2 = 1/ground^2 + 1/FAR^2), and metres to the
+sky."""
 ROOFS: Final = 6.0
 """How far houses and trees reach above the camera, by its height above the ground."""
 WELL, READ_NOISE = 4096.0, 3.0
@@ -55,7 +55,7 @@ def to_codes(light: Light) -> Rgb:
 
 Random = np.random.Generator
 Apply = Callable[[Rgb, float, Light, Random], Rgb]
-"""A function of the image, the strength, the depth, and what is drawn at random.
+"""A function of the image, the strength, the depth, and the random generator.
 
 The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN where not known."""
 
@@ -85,7 +85,7 @@ def dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
 def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float32]:
     """Fade light into the air's, L t + A (1 - t) with t = exp(-b d) (Koschmieder, 1924).
 
-    A is 0.6 of the brightest hundredth of the image; above the horizon what is bright is sky.
+    A is 0.6 of the brightest hundredth of the image; bright pixels above the horizon are sky.
     Returned is also A.
     """
     grey = light.mean(axis=2)
@@ -209,7 +209,7 @@ class Disturbance(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Disturbance:
-        """Read ``KIND:STRENGTH``; a `SettingError` with what is allowed if it is none."""
+        """Read ``KIND:STRENGTH``; a `SettingError` that lists the allowed ones if it is none."""
         kind, _, number = text.strip().lower().partition(":")
         if (allowed := kinds().get(kind)) is None:
             remedy = f"{likely(kind, kinds())}choose {', '.join(kinds())} (as fog:2)"
@@ -222,7 +222,7 @@ class Disturbance(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its name in tables and paths, as ``fog-2``."""
+        """Its name in tables and paths, such as ``fog-2``."""
         sign = "" if not self.is_signed else "minus" if self.strength < 0 else "plus"
         return f"{self.kind}-{sign}{abs(self.strength):g}".replace(".", "_")
 
@@ -251,7 +251,7 @@ class Disturbance(NamedTuple):
 
 @lru_cache(4)
 def assumed_depth(height: int, width: int) -> Light:
-    """Return the metres to flat ground by row, h f / (row - horizon), of a camera as in many cars.
+    """Return the metres to flat ground by row, h f / (row - horizon), of a camera of a usual car.
 
     It is at h = 1.4 m, with f = 0.8 of the width and the horizon at 45 % of the height.
     """

@@ -42,7 +42,8 @@ class Outputs:
     def of(cls, settings: OutputSettings, drive: str) -> Outputs:
         """Return the places of a drive's results: from the settings, or by its name.
 
-        The folder is named as the recording, where that is named: no other run's is replaced.
+        The folder has the name of the recording, if that is named: no folder of another run is
+        replaced.
         """
         saved = Path(settings.save or Path("recordings", f"{drive}.rrd"))
         name = (saved.stem if settings.save else drive).strip(".") or drive
@@ -69,9 +70,9 @@ def holding(
 ) -> Iterator[bool]:
     """Hold the files that a command writes, and its results folder, if it writes one.
 
-    What earlier runs have left of them is removed. Yields whether it is certain that no other run
-    writes them. A `RoadevalError` if one is an input or another output, cannot be written, or is
-    being written by another run.
+    Leftovers of earlier runs are removed. Yields whether it is certain that no other run writes
+    them. A `RoadevalError` if one is an input or another output, cannot be written, or is being
+    written by another run.
     """
     paths = [Path(file) for file in files if file is not None]
     outputs = [*paths, *([folder] if folder else [])]

@@ -82,9 +82,9 @@ def open_log(
 ) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
-    By default messages of no use for a replay are only counted. With ``by_summary`` only the first
-    messages of a log that lies elsewhere are there, see `outline_of`, unless its summary does not
-    suffice. A `LogError` if it is missing, unreadable, or no MCAP log.
+    By default messages that a replay does not use are only counted. With ``by_summary`` only the
+    first messages of a log that lies elsewhere are read, if its summary suffices, see `outline_of`.
+    A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
@@ -248,7 +248,7 @@ class Log:
         return parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
 
     def select(self) -> Selection:
-        """Choose what to replay: what the settings name, else what the log leaves no doubt about.
+        """Choose what to replay: topics that the settings name, else those without doubt.
 
         Another log that holds masks stays open as long as this one. A `LogError` if a topic is
         missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
@@ -499,9 +499,9 @@ def describe(
     """Describe a log by its summary and indexes, and what a replay would choose of it.
 
     With ``verify``, or if it has at most `SMALL` bytes, it is read completely to find all damage;
-    ``on_bytes`` is that of `Log.verify`. Of a log that lies elsewhere only the summary and the
-    first messages are read without ``verify``, unless they do not suffice. A `LogError` if the log
-    is missing, unreadable, or no MCAP log.
+    ``on_bytes`` is that of `Log.verify`. Without ``verify`` only the summary and the first messages
+    of a log that lies elsewhere are read, if they suffice. A `LogError` if the log is missing,
+    unreadable, or no MCAP log.
     """
     config = config or LogConfig()
     # Labels beside the log, and the images of one of several cameras, are sought all over it.

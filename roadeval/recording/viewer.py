@@ -140,7 +140,7 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
 def ask(request: Callable[[], Answer]) -> Answer:
     """Return the viewer's answer to a request, which is repeated after a timeout.
 
-    Rerun's own timeout is 15 seconds, in which a busy machine may not have drawn once. A
+    Rerun's own timeout is 15 seconds; by then a busy machine may not have drawn once. A
     `RecordingError` if it does not answer in time, or has ended.
     """
     deadline = time.monotonic() + LOADING_S

@@ -48,11 +48,11 @@ _TOP, _ROW, _BOTTOM = 64, 44, 50
 _PICTURE, _HEADER = 100, 50
 """Shares of a row's width: each picture, and at least its header."""
 _ROWS: Final = 2
-"""Most variants that have a row: with more every picture would be too small."""
+"""Greatest number of variants that have a row: with more every picture would be too small."""
 _ABREAST: Final = 3
 """Cameras side by side."""
 _OUTCOMES: Final = 4
-"""Most variants with a picture of errors at the top."""
+"""Greatest number of variants with a picture of errors at the top."""
 
 Cell = tuple[LayerSpec, ...]
 """Layers that share a picture."""

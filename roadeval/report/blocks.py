@@ -38,7 +38,7 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """The block's name in templates, as ``heading``."""
+        """The block's name in templates, such as ``heading``."""
         return type(self).__name__.lower()
 
     def as_json(self) -> dict[str, Any]:
@@ -135,9 +135,9 @@ class Cell(Block):
     bold: bool = False
     """Whether it is the best of its column, or of its row."""
     look: Look | None = None
-    """The look of its variant in charts, whose mark stands before the text."""
+    """The look of its variant in charts; the mark stands before the text."""
     frames: Sequence[int] = ()
-    """The frames whose numbers the text is; on a page they are links to the frames."""
+    """The frames, if the text is a list of their numbers; on a page these are links."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Table(Block):
     small: bool = False
     """Whether it is set in small type."""
     name: str = ""
-    """A name by which the script of a page finds it."""
+    """Name by which the script of a page looks it up."""
     find: str = ""
     """The label of a field on a page that searches words in a table of many rows."""
 
@@ -275,7 +275,8 @@ class Picture(Block):
     """A picture of a strip."""
 
     name: str
-    """The same name in every frame, as ``filtered: errors``: another frame shows its picture."""
+    """The same name in every frame, such as ``filtered: errors``: another frame shows its
+    picture."""
     title: str
     """A few words on its content."""
     image: ImageFile

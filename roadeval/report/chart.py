@@ -16,7 +16,7 @@ from typing import Final
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
 
 POINTS: Final = 1500
-"""Most points of a series along the drive: a screen has no room for more."""
+"""Greatest number of points of a series along the drive: a screen has no room for more."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Chart:
     """A chart."""
 
     title: str
-    """The title without the unit, as ``ERR``."""
+    """The title without the unit, such as ``ERR``."""
     kind: ChartKind
     series: Sequence[Series]
     names: Sequence[str] = ()
@@ -148,7 +148,7 @@ class Chart:
     level: Level | None = None
     """A value that lies across the chart."""
     across: str = ""
-    """Quantity of positions that are neither frames nor names, as ``recall``; in `unit`."""
+    """Quantity of positions that are neither frames nor names, such as ``recall``; in `unit`."""
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     """Ends of the axes; by default the ends of the numbers."""

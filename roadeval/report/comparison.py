@@ -30,7 +30,7 @@ Row = MaskChange | MovedFrame | compare.RegionChange | compare.DriveChange | com
 Columns = dict[str, Callable[[Any], Cell | str]]
 """The function that makes a row's cell in each column, by the columns' titles."""
 NAMED: Final = 20
-"""Most drives in the table of a mask's changed drives."""
+"""Greatest number of drives in the table of a mask's changed drives."""
 CHANGE: Final = ("base %", "new %", "change", "interval")
 """The titles of a change's columns."""
 _COMMAND: Final = "in the viewer"
@@ -196,7 +196,7 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
 
 
 def _changed(comparison: Comparison) -> list[MaskChange]:
-    """Return the changes to show, without the variants of which no stage changed."""
+    """Return the changes to show, without the variants that changed in no stage."""
     names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
     return [row for row in comparison.changes if (row.result, row.variant) in names]
 

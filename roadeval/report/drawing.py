@@ -19,9 +19,10 @@ from roadeval.data.words import MINUS
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
-"""Most marks along a line: a line with more points has none."""
+"""Greatest number of marks along a line: a line with more points has none."""
 ROOM: Final = 0.06
-"""Share of an axis behind its last tick: half of a number of three digits on a telephone."""
+"""Share of an axis after its last tick: room for half of a number of three digits on a
+telephone."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)

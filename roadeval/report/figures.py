@@ -46,7 +46,7 @@ FOOT: Final = 0.45
 GAP_OF_AXES: Final = 0.15
 """Inches at the edges of a figure, left of its axes, below them, and between two of them."""
 NARROW: Final = 5
-"""Inches from which on a figure has room for letters of full size everywhere."""
+"""Width in inches from which a figure has room for letters of full size."""
 HANDLE: Final = 2.6
 """Length of a line in a legend, in its letters' size."""
 LETTERS: Final = 9
@@ -136,7 +136,8 @@ def as_svg(figure: Figure) -> bytes:
 
 
 MARKED: Final = 25
-"""Most markers along a line; a line with more points has markers at regular distances."""
+"""Greatest number of markers along a line; a line with more points has markers at regular
+distances."""
 CROWDED: Final = 150
 """More windows than this are drawn as means of neighbours."""
 _LABELS: Final = {

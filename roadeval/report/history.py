@@ -26,7 +26,7 @@ BARS: Final = "▁▂▃▄▅▆▇█"
 SPARKS: Final = 30
 """Letters of a rate over the runs in a table."""
 ROWS: Final = 10
-"""Most drives of an event, and most parts of the pixels with a chart."""
+"""Greatest number of drives of an event, and of parts of the pixels with a chart."""
 Rows = list[list[Cell | str]]
 
 
@@ -83,7 +83,7 @@ def rates_table(lines: Sequence[Line]) -> Table:
 def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
     """Return the first and the last rate, and bars for the runs, from the least to the greatest.
 
-    Runs that share a bar are its mean; a run without a level is a space.
+    If several runs share a bar, it shows their mean; a run without a level is a space.
     """
     defined = rates[~np.isnan(rates)]
     if not len(defined):
@@ -91,7 +91,7 @@ def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
     parts = [part[~np.isnan(part)] for part in np.array_split(levels, min(SPARKS, len(levels)))]
     means = np.array([part.mean() if len(part) else np.nan for part in parts])
     low, high = np.nanmin(means), np.nanmax(means)
-    # Bars of a rate that stays are low, whatever the rounding.
+    # If a rate does not change, its bars are low, independent of rounding.
     places = np.nan_to_num((means - low) / max(high - low, 1e-4) * (len(BARS) - 1)).round()
     bars = [" " if np.isnan(m) else BARS[int(p)] for m, p in zip(means, places, strict=True)]
     return percent(float(defined[0])), percent(float(defined[-1])), "".join(bars)

@@ -16,9 +16,9 @@ from roadeval.report.blocks import ImageFile, ImageGrid
 
 ROAD: Final = mask_spec("road", "road")
 EXAMPLE_WIDTH: Final = 400
-"""Most pixels across an example's picture."""
+"""Greatest width of an example's picture in pixels."""
 WIDTH: Final = 420
-"""Most pixels across a picture: about 200 an inch at a quarter of the page."""
+"""Greatest width of a picture in pixels: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
 FINEST: Final = 95
 """Quality of a JPEG in a report, and in a figure of its own."""

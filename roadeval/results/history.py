@@ -19,7 +19,7 @@ FORMAT: Final = {"name": "roadeval-history", "version": 1}
 DRIVES: Final = 20
 """Drives of a change in the JSON file, those that changed most."""
 NEAR: Final = 2
-"""Most runs between steps of noisy lines that are one event."""
+"""Greatest number of runs between steps of noisy lines that are one event."""
 EXACT: Final = 1e-4
 """Noise below which equal runs give equal numbers."""
 
@@ -52,7 +52,7 @@ class Event:
     """The last scored run before it."""
     changes: list[LineChange]
     reasons: Sequence[str] = ()
-    """Differences from the run before, as ``svm.c 1 to 2``."""
+    """Differences from the run before, such as ``svm.c 1 to 2``."""
     frames: list[tuple[str, int, float]] = field(default_factory=list)
     """Drive, number and change of ERR of the frames that changed most."""
 

@@ -1,7 +1,7 @@
 """The verdict on a result: how wrong its focus is, compared with what, and what to do next.
 
-What happened on these frames or drives is exact and comes first. What it says of others follows in
-one sentence, which never gives an interval of a single drive whose frames count as a few.
+What happened on these frames or drives is exact and comes first. One sentence on other frames
+follows; it never gives an interval of a single drive with few independent frames.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
-"""Independent frames below which those of one drive say little about other frames."""
+"""Number of independent frames; with fewer, one drive says little about other frames."""
 WORDS: Final = 60
 """Words of a verdict; a longer one does not explain the baseline."""
 WEAK: Final = 0.02
@@ -260,7 +260,7 @@ def _next_step(
 ) -> Iterator[str]:
     """Yield what to do next: set the threshold, or try the preset that is best on real roads.
 
-    A threshold is not told if fewer pixels are hardly wrong at it, or if nothing is road above it.
+    A threshold is not named if it hardly lowers the error, or if no pixel is road above it.
     """
     own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
     best = thresholds.get(focus)

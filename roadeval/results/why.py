@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TIMES: Final = 1.5
-"""Least ratio of two error rates that a sentence tells as a ratio."""
+"""Least ratio of two error rates that a sentence states as a ratio."""
 MOST: Final = 4
-"""Most reasons for the errors of a variant."""
+"""Greatest number of reasons for the errors of a variant."""
 
 
 def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[Reason]]:
-    """Return the reasons for the errors of each variant of which something is confirmed.
+    """Return the reasons for the errors of each variant for which some are confirmed.
 
     They name the class of its false road and the class beside its missed road, the condition under
     which it errs most, and the disturbance that harms it most. Nothing is explained if truth or
@@ -60,7 +60,7 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
 
 
 NAMED: Final = 3
-"""Most classes that a sentence names."""
+"""Greatest number of classes that a sentence names."""
 LEAST_WRONG: Final = 0.001
 """Less false road, or missed road, than this share of the pixels makes no sentence."""
 LEAST_SHARE: Final = 0.25

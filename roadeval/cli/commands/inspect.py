@@ -24,7 +24,7 @@ Focus = Annotated[
     str | None,
     arguments.option(
         "--variant --focus",
-        "Variant by which frames rank. Default: what you brought, else filtered.",
+        "Variant that ranks the frames. Default: what you brought, else filtered.",
         "NAME",
     ),
 ]

@@ -64,7 +64,7 @@ def show(outcome: Outcome, out: Console) -> None:
 
 
 def show_verdict(facts: Facts, out: Console) -> None:
-    """Print the verdict, the last of what a replay prints but for losses."""
+    """Print the verdict; only losses follow it."""
     if facts.totals:
         tables.show_verdict(facts, out)
         return

@@ -175,7 +175,7 @@ def worst(drive: DriveResult) -> WorstFrame | None:
 
 
 def without_pictures(drive: DriveResult, frame: int) -> str:
-    """Return a sentence on a frame that was scored and whose pictures were not kept, else ""."""
+    """Return a sentence if a frame was scored and its pictures were not kept, else ""."""
     if drive.recording is None or frame in {*drive.pictured} or frame not in {*drive.rows["frame"]}:
         return ""
     return f"the recording has no pictures of frame {frame}, so the views of them are empty"

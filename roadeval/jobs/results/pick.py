@@ -74,26 +74,26 @@ def pick(
     Parameters
     ----------
     source
-        A recording or the results folder beside it, a log, which is replayed first, or a fleet's
-        folder, of which the recordings that were kept are taken; or several of these.
+        A recording or the results folder beside it; a log, which is replayed first; a fleet's
+        folder, with the recordings that it has kept; or several of these.
     count
-        How many frames to label; of several drives each gives as many as its length asks for.
+        Number of frames to label; several drives share it by their lengths.
     folder
-        Where they land; of several drives in a folder each, of its name. Where it holds picks
-        already, these go on: no frame comes twice.
+        Folder of the frames; each of several drives has a folder of its name in it. If it holds
+        picks already, new frames are added: no frame comes twice.
     config
-        How a log is replayed.
+        Configuration for the replay of a log.
     labels
-        In which format the present masks are written for correction: ``png`` or ``coco``.
+        Format of the present masks that are written for correction: ``png`` or ``coco``.
     variant
-        Whose masks, and by whose doubt; by default the first one.
+        Variant with the masks and the doubt; by default the first one.
     seed
-        Of the drawing; picks that go on keep theirs.
+        Random seed of the drawing; existing picks keep theirs.
 
     Raises
     ------
     RoadevalError
-        If nothing can be picked, with what to do.
+        If nothing can be picked; its text says what to do.
     """
     sources = [source] if isinstance(source, str | PathLike) else [*source]
     if not sources:

@@ -117,7 +117,7 @@ def write_figures(
     folder
         Made if it is not there. Files of these names are replaced.
     width
-        Of each figure, as ``8.5cm``, ``85mm`` or ``3.35in``. Letters keep their size.
+        Width of each figure, such as ``8.5cm``, ``85mm`` or ``3.35in``. Letters keep their size.
     title
         ``none`` leaves out the lines above a figure, for a text with captions of its own.
     """

@@ -238,7 +238,7 @@ class FleetRun:
                 future.cancel()
 
     def _reason(self, error: Exception, doing: str) -> str:
-        """Return why a task has failed; what ends the whole run is raised."""
+        """Return why a task has failed; an error that ends the whole run is raised."""
         if isinstance(error, RoadevalError):
             raise error
         if isinstance(error, CancelledError):

@@ -37,7 +37,7 @@ RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undis
 
 
 def is_rectified(name: str) -> bool:
-    """Return whether a topic's name says that its images are rectified, as ``/cam/rect/image``.
+    """Return whether a topic's name says that its images are rectified: ``/cam/rect/image``.
 
     RealSense calls images with distortion ``image_rect_raw``.
     """

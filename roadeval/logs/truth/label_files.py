@@ -29,9 +29,9 @@ from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input, reading
 
 GREATEST: Final = 256 << 20
-"""Most bytes of a file of labels."""
+"""Greatest number of bytes of a file of labels."""
 VALUES: Final = 20_000_000
-"""Most numbers and texts in it."""
+"""Greatest number of values in it."""
 _BAD_FORMAT: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
 """Exceptions that a reader raises if a file breaks the rules of its format."""
 _UNREADABLE: Final = (*_BAD_FORMAT, LogError, BadMessage, ImageError)
@@ -132,7 +132,7 @@ def _read_drawn(
     size: Size | None,
     settings: MaskSettings,
 ) -> LabelSet:
-    """Read the files of a format, of which some are parsed; a `LogError` if no label is in them."""
+    """Read the files of a format, some of them parsed already; a `LogError` without any label."""
     drawings, broken, others = _read_images(files, parsed, format_, size)
     notes = []
     lost = len(broken)

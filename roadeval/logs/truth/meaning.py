@@ -80,7 +80,7 @@ NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
 )
 LONG: Final = 80
-"""Most letters of a class's name in results."""
+"""Greatest number of letters of a class's name in results."""
 RARE: Final = 0.05
 """A smaller share of the labelled pixels is hardly the road before a vehicle."""
 

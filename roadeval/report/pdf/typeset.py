@@ -63,7 +63,7 @@ def _compile(
     kind: Literal["pdf", "png"] = "pdf",
     pixels_per_inch: int | None = None,
 ) -> bytes:
-    """Compile files, of which one is the main file, to a PDF or PNG.
+    """Compile files, one of them the main file, to a PDF or PNG.
 
     Fonts are Typst's own and, for figures and charts, Matplotlib's DejaVu Sans; never the
     machine's, so that a document looks the same everywhere. A letter that none of them has is an

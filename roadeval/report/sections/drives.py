@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NAMED: Final = 12
-"""Most drives in the table of the worst, and most reasons in a table of missing ones."""
+"""Greatest number of drives in the table of the worst, and of reasons why drives are missing."""
 OF_ONE_REASON: Final = 4
-"""Most drives that are named for one reason."""
+"""Greatest number of drives that are named for one reason."""
 TAGS: Final = 48
-"""Most letters of a drive's tags."""
+"""Greatest number of letters of a drive's tags."""
 _WORDS: Final = ("drive", "state", "group", "tags")
 _SHOWN: Final = (TESTED, "FPR", "FNR")
 
@@ -211,7 +211,7 @@ def missing(findings: FleetFolder) -> Iterator[Block]:
 def by_reason(findings: FleetFolder, rows: pd.DataFrame) -> dict[str, list[str]]:
     """Return the drives' names by their first loss, or by why they failed or have no score.
 
-    Reasons are without the name of the drive's file, with which most of them begin.
+    The name of the drive's file, with which most reasons begin, is left out.
     """
     drives: defaultdict[str, list[str]] = defaultdict(list)
     for drive, row in zip(rows.index, records(rows), strict=True):
@@ -252,10 +252,10 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
 WORST_AT: Final = "#the-worst-frames-over-all-drives"
 """The address of the worst frames' heading on the page of a fleet."""
 SEEN: Final = 12
-"""Most pictures that a page shows at once."""
+"""Greatest number of pictures that a page shows at once."""
 ACROSS: Final = 4
 LONGEST: Final = 20
-"""Most letters of a drive's name below a picture."""
+"""Greatest number of letters of a drive's name below a picture."""
 
 
 def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iterator[Block]:

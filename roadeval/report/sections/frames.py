@@ -36,7 +36,7 @@ SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
 LEAST: Final = 4
 MOST: Final = 6
-"""Least and most pictures of outcomes beside each other."""
+"""Least and greatest number of pictures of outcomes beside each other."""
 
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
@@ -130,7 +130,8 @@ LARGE_ON_PAGE: Final = 520
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
-"""Most frames in the table; the table of a longer drive has those with the highest ERR."""
+"""Greatest number of frames in the table; the table of a longer drive has those with the highest
+ERR."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,10 +21,10 @@ from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
 
 LOSSES: Final = 3
-"""Most losses that are named."""
+"""Greatest number of losses that are named."""
 STATUSES: Final = {
     SCORED: "scored",
-    DAMAGED: "scored but for what is lost",
+    DAMAGED: "scored without the lost part",
     UNSCORED: "without truth",
     FAILED: "failed",
 }

@@ -71,7 +71,7 @@ def _uncompressed(data: Buffer) -> Buffer:
     import zstandard
 
     if not 0 <= zstandard.frame_content_size(data) <= LARGEST:
-        raise BadMessage("a compressed message of a size that cannot be")
+        raise BadMessage("a compressed message of an impossible size")
     message: bytes = zstandard.ZstdDecompressor().decompress(data)
     return message
 
@@ -118,7 +118,7 @@ def read_json(data: Buffer) -> Any:
     if isinstance(content := getattr(message, "data", None), str):
         message.data = base64.b64decode(content, validate=True)
     elif hasattr(message, "data"):  # else it is no image
-        message.data = bytes([*message.data])  # bytes of a number would be as many zeros
+        message.data = bytes([*message.data])  # bytes(5) would be five zeros
     return message
 
 

@@ -84,7 +84,7 @@ def lengths_in(text: str) -> Sequence[int]:
     """Return the lengths of runs from COCO's text.
 
     Each letter has five bits of a number, the lowest ones first. From the fourth number on it is
-    the difference from the last but one.
+    the difference from the number two places before.
     """
     lengths: list[int] = []
     value = shift = 0
