@@ -109,7 +109,7 @@ def override(settings: Any, values: Any, table: str) -> Any:
     _check(values, settings, table)
     merged = _merge(dataclasses.asdict(settings), values)
     try:
-        # Of JSON a strict check accepts a list as a tuple, but neither text nor true as a number.
+        # In JSON a list passes a strict check as a tuple, but neither text nor true as a number.
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:

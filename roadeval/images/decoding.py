@@ -109,7 +109,7 @@ def _label_values(image: Any) -> Array:
             return opacity
         if np.intersect1d(packed[clear], packed[~clear]).size:
             raise ImageError(
-                "a label image of which one colour is transparent in parts: save it without "
+                "a label image with one colour that is transparent in parts: save it without "
                 "transparency"
             )
     return without_colours(colours)
@@ -211,7 +211,7 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     try:
         height, width, *_ = simplejpeg.decode_jpeg_header(data)
     except (ValueError, KeyError) as error:  # KeyError for an unknown subsampling
-        what = "a JPEG whose head is damaged, or of a rare chroma subsampling"
+        what = "a JPEG with a damaged head or a rare chroma subsampling"
         raise _jpeg_error(data, what) from error
     return width, height
 

@@ -183,7 +183,7 @@ BUILT_IN: Final = (
     DisturbanceKind("blur", "radius in 1/320 of the width", blur, 0, 20),
     DisturbanceKind("dirt", "dozens of spots on the lens", dirt, 0, 10),
     DisturbanceKind("rain", "25 mm/h", rain, 0, 10),
-    DisturbanceKind("jpeg", "quality, of which less is worse", jpeg, 1, 100),
+    DisturbanceKind("jpeg", "quality; a lower one is worse", jpeg, 1, 100),
     DisturbanceKind("noise", "gain as a power of 4", noise, 0, 6),
     DisturbanceKind("exposure", "stops of more light, or less", exposure, -10, 10),
 )

@@ -199,20 +199,18 @@ class Log:
             if self.size <= SMALL or not container.is_covered:
                 container.verify_data()
         lost = [str(damage) for damage in self.damage if damage.lossy]
-        images = [topic for topic in self.topics if topic.is_image] if lost else []
-        return (*lost, *map(self._describe_rest, images))
+        for topic in (topic for topic in self.topics if lost and topic.is_image):
+            reader = self.readers[topic.name]
+            total, kept = max(reader.expected(), len(reader)), reader.readable()
+            of_total = f" of {total}" if total > kept else ""
+            until = ((topic.last_ns or self.start_ns) - self.start_ns) / NS
+            lost.append(f"{topic.name}: {kept}{of_total} images kept, up to {until:.3f} s")
+        return tuple(lost)
 
     @property
     def size(self) -> int:
         """Bytes of all its files."""
         return sum(len(container.source) for container in self.containers)
-
-    def _describe_rest(self, topic: TopicInfo) -> str:
-        reader = self.readers[topic.name]
-        total = max(reader.expected(), len(reader))
-        of_total = f" of {total}" if total > reader.readable() else ""
-        until = (topic.last_ns or self.start_ns) - self.start_ns
-        return f"{topic.name}: {reader.readable()}{of_total} images kept, up to {until / NS:.3f} s"
 
     @cached_property
     def digest(self) -> str:

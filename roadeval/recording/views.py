@@ -192,7 +192,16 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
 
 def overview(layout: Layout) -> BlueprintPart:
     """Return the first tab."""
-    rows = {variant.name: _cells(variant) for variant in layout.shown[:_ROWS]}
+    rows: dict[str, list[Cell]] = {}
+    for variant in layout.shown[:_ROWS]:
+        cells = rows[variant.name] = []
+        for spec in variant.layers:
+            # An overlay joins the one before it, unless it is the mask of a stage.
+            joins = is_overlay(spec) and spec.name not in variant.stages
+            if joins and cells and is_overlay(cells[-1][0]):
+                cells[-1] = (*cells[-1], spec)
+            else:
+                cells.append((spec,))
     columns = max(map(len, rows.values()))
     shortest = min(rows, key=lambda name: len(rows[name]))
     aside = {shortest: _events()} if len(rows[shortest]) + 1 < columns else {}
@@ -216,22 +225,6 @@ def overview(layout: Layout) -> BlueprintPart:
         row_shares=[_TOP, *[_ROW] * len(rows), _BOTTOM],
         name="Overview",
     )
-
-
-def _cells(variant: VariantLayout) -> list[Cell]:
-    """Return the layers, grouped into pictures.
-
-    An overlay joins the overlay before it, as rings join their shadow, unless it is a stage's mask,
-    which begins a picture of its own.
-    """
-    cells: list[Cell] = []
-    for spec in variant.layers:
-        joins = is_overlay(spec) and spec.name not in variant.stages
-        if joins and cells and is_overlay(cells[-1][0]):
-            cells[-1] = (*cells[-1], spec)
-        else:
-            cells.append((spec,))
-    return cells
 
 
 def _row(

@@ -85,7 +85,18 @@ def where(comparison: Comparison) -> list[str]:
     """Return where final masks are surely better or worse: regions, frames and drives."""
     still = {(mask.result, mask.variant) for mask in comparison.finals() if mask.unchanged}
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
-    sentences = [_by_region(comparison, *mask) for mask in masks if mask not in still]
+    sentences = []
+    for mask in [mask for mask in masks if mask not in still]:
+        regions = [row for row in comparison.regions if (row.result, row.variant) == mask]
+        sure, parts = [row for row in regions if is_significant(row.difference)], []
+        for word, sign in (("better", -1), ("worse", 1)):
+            titles = [row.title for row in sure if sign * row.difference.mean > 0]
+            if len(titles) == len(regions):
+                parts.append(f"{word} everywhere")
+            elif titles:
+                parts.append(f"{word} ({'; '.join(titles)})")
+        changes = ", ".join(parts) or why_unsure(row.difference for row in regions)
+        sentences.append(f"{_mask_name(*mask)} by region: {changes}")
     base = comparison.results[0].label
     for mask, rows in groupby(comparison.classes, lambda row: (row.result, row.variant)):
         parts = [
@@ -100,20 +111,6 @@ def where(comparison: Comparison) -> list[str]:
         named = [f"{first.frame} ({most} % of the pixels)", *(str(frame.frame) for frame in rest)]
         sentences.append(f"{result} disagrees most on frames {', '.join(named)}")
     return [*sentences, *changed_drives(comparison)]
-
-
-def _by_region(comparison: Comparison, result: str, variant: str) -> str:
-    rows = [r for r in comparison.regions if (r.result, r.variant) == (result, variant)]
-    sure = [r for r in rows if is_significant(r.difference)]
-    parts = []
-    for word, sign in (("better", -1), ("worse", 1)):
-        names = [r.title for r in sure if sign * r.difference.mean > 0]
-        if len(names) == len(rows):
-            parts.append(f"{word} everywhere")
-        elif names:
-            parts.append(f"{word} ({'; '.join(names)})")
-    changes = ", ".join(parts) or why_unsure(row.difference for row in rows)
-    return f"{_mask_name(result, variant)} by region: {changes}"
 
 
 def why_unsure(differences: Iterable[Difference]) -> str:

@@ -141,8 +141,8 @@ def verdict(history: History) -> str:
         masks = (line for line in history.lines if (line.variant, line.kind) == (focus, ALL))
         there = max((sum(map(defined, line.rates.tolist())) for line in masks), default=0)
         if there < 2:
-            return f"{focus} is in {there} of {count}, which tells no change."
-        return f"No change of {focus} in {counted(there, 'run')} is more than chance may do."
+            return f"{focus} is in {there} of {count}, too few to show a change."
+        return f"No change of {focus} in {counted(there, 'run')} is beyond chance."
     standing = history.standing
     ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or [
         max(of_focus, key=lambda e: e.run)

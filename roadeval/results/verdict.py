@@ -336,7 +336,7 @@ def from_labels(estimated: EstimateFacts | None, variant: str) -> Iterator[str]:
     if rate.unseen:
         yield (
             f"{number(rate.unseen)} frames are far more in doubt than any that was drawn: the "
-            "upper end takes them for wrong altogether. More labels, drawn at random, would tell."
+            "upper end counts all their pixels as wrong. More labels, drawn at random, would tell."
         )
     worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in estimated.apart.items())
     if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:

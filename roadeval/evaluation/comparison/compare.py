@@ -233,7 +233,7 @@ def compare(
                     problem = f"{side.label} does not say which log it is of"
                     raise ComparisonError(f"{problem}, so nothing can be compared")
             raise ComparisonError(
-                f"{old.label} and {new.label} are of different drives, whose difference would mix "
+                f"{old.label} and {new.label} are of different drives: a comparison would mix "
                 "the scene with the method; compare results of the same drives"
             )
         part = _compare_two(old, new, matched, settings, across_variants=across_variants)

@@ -152,7 +152,7 @@ def find_recordings(source: Path) -> list[Path]:
             return [source]
         recording = DriveResult(source).viewable
         if recording is None:
-            raise RoadevalError(f"{source}: its recording is not where it was; name that")
+            raise RoadevalError(f"{source}: its recording was moved; name its new place")
         return [recording]
     drives = FleetFolder(source).drives
     return [path for name in drives.index if (path := recording_path(source, name)).exists()]
@@ -238,7 +238,9 @@ def _begin_picks(
         raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
     stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
     if len({*stamps}) < len(stamps):
-        raise RoadevalError(f"{source}: several frames have one stamp, so no label finds its own")
+        raise RoadevalError(
+            f"{source}: several frames have one stamp, so labels cannot name their frames"
+        )
     doubts = rows[sign].tolist() if sign else [np.nan] * len(rows)
     (variant,), identity = values_of(rows, "variant"), drive.properties.get("input")
     return Picks(

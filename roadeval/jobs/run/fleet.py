@@ -246,7 +246,7 @@ class FleetRun:
             raise FleetError(problem, where=self.folder, remedy=fleet_work.GO_ON) from error
         if is_worker_death(error):
             return (
-                f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
+                f"its worker process ended {ATTEMPTS} times while {doing}, as it does when memory "
                 "runs out"
             )
         return " ".join(f"{type(error).__name__}: {error}".split())

@@ -90,7 +90,7 @@ def calibration_of(
     except ValueError as error:
         notes.append(f"its place is not known: the transform of {error}")
     if mounting and mounting.has_body_axes:
-        notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read so")
+        notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read as such")
         mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
         lens = replace(lens, frame_id=f"{frame}_optical")
     return replace(lens, mounting=mounting), Sentence("; ").join(notes)

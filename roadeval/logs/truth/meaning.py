@@ -74,7 +74,7 @@ _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 2
 """The values of masks that need no settings, and their meaning."""
 TWO_KINDS: Final = Sentence(
     "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road "
-    "with {labels.road}, both where both do"
+    "with {labels.road}, or both if both do"
 )
 NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"

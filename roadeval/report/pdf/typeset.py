@@ -93,8 +93,8 @@ def _compile(
             )
     except OSError as error:
         raise ReportError(
-            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are put "
-            f"together there, and it cannot be written ({error.strerror}); make room, or name "
+            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are made "
+            f"there, and it cannot be written ({error.strerror}); make room, or name "
             "another folder with TMPDIR"
         ) from error
     return compiled

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
-from roadeval.data.arrays import Floats
 from roadeval.data.words import DASH, defined, number, percent, points
 from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
@@ -147,8 +146,17 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
         return
     trimaps = {n: m["trimap"] for n, m in findings.facts.beyond.items() if "trimap" in m}
     blocks: list[Block] = [Figure([charts.trimap(trimaps)], caption("trimap"))] if trimaps else []
-    if findings.heatmaps:
-        blocks.append(_heat_maps(findings.heatmaps))
+    if maps := findings.heatmaps:  # equal shades are equal shares
+        most = [max(float(np.nanmax(both[n])) for both in maps.values()) for n in (0, 1)]
+        pictures = [
+            (f"{outcome} of {name}", heat_map(shares, top, colour))
+            for name, both in maps.items()
+            for outcome, shares, top, colour in zip(
+                ("FP", "FN"), both, most, (colours.FP, colours.FN), strict=True
+            )
+        ]
+        darkest = dict(zip(("fp", "fn"), (percent(share, 1) for share in most), strict=True))
+        blocks.append(ImageGrid(pictures, 4, caption=caption("heat maps", **darkest)))
     if blocks:
         yield Details("By distance from the road's edge, and by place in the image", blocks)
 
@@ -215,23 +223,6 @@ def _oracles(findings: Findings) -> Iterator[Block]:
             errors = {"perfect": percent(row[TESTED]), "without": percent(without[TESTED])}
             blocks.append(note("perfect filter", **errors, meaning=meaning))
     yield Details("If a stage were perfect", blocks)
-
-
-def _heat_maps(maps: Mapping[str, Floats]) -> ImageGrid:
-    """Return the places of each variant's errors, see `roadeval.report.findings.Findings.heatmaps`.
-
-    Equal shades are equal shares.
-    """
-    most = [max(float(np.nanmax(shares[place])) for shares in maps.values()) for place in (0, 1)]
-    pictures = [
-        (f"{outcome} of {name}", heat_map(shares, top, colour))
-        for name, by_outcome in maps.items()
-        for outcome, shares, top, colour in zip(
-            ("FP", "FN"), by_outcome, most, (colours.FP, colours.FN), strict=True
-        )
-    ]
-    darkest = dict(zip(("fp", "fn"), (percent(share, 1) for share in most), strict=True))
-    return ImageGrid(pictures, 4, caption=caption("heat maps", **darkest))
 
 
 def thresholds(findings: Findings) -> Iterator[Block]:
