@@ -149,8 +149,8 @@ class RunConfig(LogConfig):
 
     def brought(self) -> list[str]:
         """Name the variants that were brought beside those of the preset, as in `names`."""
-        given = {variant.name for variant in variants_of(self.pipeline, (), self.preset)}
-        return [name for name in self.names() if name not in given]
+        preset_names = {variant.name for variant in variants_of(self.pipeline, (), self.preset)}
+        return [name for name in self.names() if name not in preset_names]
 
     def check_focus(self, names: Iterable[str]) -> None:
         """Raise a `ConfigError` if the chosen focus is none of these variants."""
@@ -274,7 +274,7 @@ class RunConfig(LogConfig):
     def input_masks(self) -> set[str]:
         """Return the names of the masks that the variants use as input."""
         settings = (pipeline.settings.get("given") for pipeline in self.pipelines().values())
-        return {given.name for given in settings if given is not None}
+        return {mask.name for mask in settings if mask is not None}
 
     def for_training(self) -> RunConfig:
         """Return the configuration with only those masks from which variants learn."""

@@ -187,9 +187,9 @@ def _merge(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]
 
 def describe_problem(problem: Mapping[str, Any]) -> str:
     """Return the message on a problem that pydantic has found, with the value that was given."""
-    given, context = problem["input"], problem.get("ctx", {})
+    entry, context = problem["input"], problem.get("ctx", {})
     plain = (words for kind, words in PLAIN_WORDS.items() if problem["type"].startswith(kind))
     message = str(context.get("error", problem["msg"]))
     message = next(plain, "{}").format(message, **context)
-    shown = problem["loc"] and not isinstance(given, Mapping)
-    return f"{message} (given: {quote(given)})" if shown else message
+    shown = problem["loc"] and not isinstance(entry, Mapping)
+    return f"{message} (given: {quote(entry)})" if shown else message

@@ -201,10 +201,10 @@ class Log:
         lost = [str(damage) for damage in self.damage if damage.lossy]
         for topic in (topic for topic in self.topics if lost and topic.is_image):
             reader = self.readers[topic.name]
-            total, kept = max(reader.expected(), len(reader)), reader.readable()
-            of_total = f" of {total}" if total > kept else ""
+            total, readable = max(reader.expected(), len(reader)), reader.readable()
+            of_total = f" of {total}" if total > readable else ""
             until = ((topic.last_ns or self.start_ns) - self.start_ns) / NS
-            lost.append(f"{topic.name}: {kept}{of_total} images kept, up to {until:.3f} s")
+            lost.append(f"{topic.name}: {readable}{of_total} images kept, up to {until:.3f} s")
         return tuple(lost)
 
     @property

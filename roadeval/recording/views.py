@@ -370,8 +370,28 @@ def before_the_first_frame(
     """Yield the static data that a recording begins with; ``camera`` is its short name in a rig."""
     for path, codec in codecs.items():
         yield path, _style(codec)
-    if layout.calibration:
-        yield at.CAMERA, list(_lens(layout.calibration))
+    if calibration := layout.calibration:
+        # Lens and place belong to named frames, as in recordings that Rerun makes of MCAP
+        # files: a pinhole of the entity itself would remove its pictures from every flat view.
+        frame, mounting = _frame_of(calibration), calibration.mounting
+        lens: list[Any] = [
+            rr.Pinhole(
+                image_from_camera=np.array(calibration.matrix).reshape(3, 3),
+                resolution=[calibration.width, calibration.height],
+                child_frame=f"{frame}_image_plane",
+                parent_frame=frame,
+            )
+        ]
+        if mounting is not None:
+            lens.append(
+                rr.Transform3D(
+                    translation=mounting.translation,
+                    quaternion=mounting.rotation,
+                    child_frame=frame,
+                    parent_frame=mounting.parent,
+                )
+            )
+        yield at.CAMERA, lens
     if layout.ground:
         yield from _plane(layout, layout.ground)
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
@@ -408,28 +428,6 @@ def _style(codec: Codec) -> list[Any]:
             ]
         case LayerKind.RGB:
             return [rr.EncodedImage.from_fields(draw_order=-10)]
-
-
-def _lens(calibration: Calibration) -> Iterator[Any]:
-    """Yield the camera's pinhole and, if known, its place.
-
-    They belong to named coordinate frames, as in recordings that Rerun makes of MCAP files: a
-    pinhole of the entity itself would remove its pictures from every two-dimensional view.
-    """
-    frame = _frame_of(calibration)
-    yield rr.Pinhole(
-        image_from_camera=np.array(calibration.matrix).reshape(3, 3),
-        resolution=[calibration.width, calibration.height],
-        child_frame=f"{frame}_image_plane",
-        parent_frame=frame,
-    )
-    if (mounting := calibration.mounting) is not None:
-        yield rr.Transform3D(
-            translation=mounting.translation,
-            quaternion=mounting.rotation,
-            child_frame=frame,
-            parent_frame=mounting.parent,
-        )
 
 
 def _frame_of(calibration: Calibration) -> str:

@@ -104,16 +104,6 @@ def comment(
         chief = replace(chief, **{kind: rows})
     first = [Heading(f"roadeval: {head}; ERR of {text}"), *overview(chief, judgements, 10)]
     texts = [*map(fit, (first, changed_drives(chief, 10), _warnings(comparison)))]
-    texts += [*_pictures(chief, mask, over), f"Again: {in_code(command)}\n"]
-    rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
-    for title, part in rest.items():
-        inside = fit(part, MOST - len("\n".join(texts).encode()) - 200)
-        texts.append(f"<details><summary>{title}</summary>\n\n{inside}\n</details>\n")
-    return "\n".join(text for text in texts if text.strip())
-
-
-def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> list[str]:
-    """Return charts of a mask's ERR, each below a sentence on what it shows."""
     base, name = chief.results[0].label, mask.variant
     lines = {line.name: line.y for chart in over for line in chart.series}
     old = lines.get(base if name == mask.result else f"{base}: {name}", [])
@@ -121,13 +111,19 @@ def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> lis
     pairs = pairs or sorted(((100 * d.base, 100 * d.new) for d in chief.drives), reverse=True)
     where = "over the drive" if old else "drive by drive"
     drawn = {f"ERR of {name}, {where}: bars are {base}, the line is {mask.result}.": levels(pairs)}
-    for unit, rows in {
+    for unit, moves in {
         "region": [(row.title, row.difference.mean) for row in chief.regions],
         "drive": [(row.drive, row.difference.mean) for row in chief.drives],
         "frame": [(f"frame {row.frame}", row.change) for row in chief.moved],
     }.items():
-        drawn[f"Change of {name} by {unit}: orange is worse, blue is better."] = changes(rows)
-    return [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
+        drawn[f"Change of {name} by {unit}: orange is worse, blue is better."] = changes(moves)
+    texts += [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
+    texts.append(f"Again: {in_code(command)}\n")
+    rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
+    for title, part in rest.items():
+        inside = fit(part, MOST - len("\n".join(texts).encode()) - 200)
+        texts.append(f"<details><summary>{title}</summary>\n\n{inside}\n</details>\n")
+    return "\n".join(text for text in texts if text.strip())
 
 
 def _warnings(comparison: Comparison) -> Iterator[Block]:

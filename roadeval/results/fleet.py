@@ -394,8 +394,8 @@ class FleetWriter:
         ):
             finals, within, disturbed = self._write_tables(members, asked or {})
             read = partial(table_of_drives, self.folder)
-            given = finals, members, settings, dict(run), within
-            facts = summarise(*given, disturbances=disturbed, read=read)
+            basis = finals, members, settings, dict(run), within
+            facts = summarise(*basis, disturbances=disturbed, read=read)
             facts = replace(facts, origin=origin)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())

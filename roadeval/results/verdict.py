@@ -47,8 +47,8 @@ def verdict_on(facts: Facts | FleetFacts) -> str:
     if isinstance(facts, Facts) and not facts.cameras:
         more |= {"thresholds": facts.thresholds}
         more |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
-    told = verdict(facts.totals, facts.effects, **more)
-    return Sentence(" ").join([*facts.misfits, told])
+    sentence = verdict(facts.totals, facts.effects, **more)
+    return Sentence(" ").join([*facts.misfits, sentence])
 
 
 AnyFacts = TypeVar("AnyFacts", bound=Facts | FleetFacts)
@@ -61,9 +61,9 @@ def with_focus(facts: AnyFacts, focus: str, doubts: pd.DataFrame | None = None) 
     """
     output = {**facts.run.get("output", {}), "focus": focus}
     changes: dict[str, Any] = {"run": {**facts.run, "output": output}}
-    known = facts.unlabelled if isinstance(facts, Facts) else None
-    if known and doubts is not None and len(rows := only(doubts, variant=focus)):
-        changes["unlabelled"] = describe_doubts(rows, known.differing)
+    unlabelled = facts.unlabelled if isinstance(facts, Facts) else None
+    if unlabelled and doubts is not None and len(rows := only(doubts, variant=focus)):
+        changes["unlabelled"] = describe_doubts(rows, unlabelled.differing)
     facts = replace(facts, **changes)
     return replace(facts, verdict=verdict_on(facts))
 
@@ -111,18 +111,18 @@ def verdict(
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
-    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
+    stages = final_stages((variant, stage) for variant, masks in totals.items() for stage in masks)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
     focus = focus_of(rates, focus)
     if best is None or focus is None:
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
-    own = rates[focus][TESTED]
+    error = rates[focus][TESTED]
     whole_drive = [*from_labels(estimated, focus)]
     lead = "On these alone: " if whole_drive else ""
     least = percent(rates[best][TESTED], 1)
-    is_other = not defined(own) or (rates[best][TESTED] < own and least != percent(own, 1))
+    is_other = not defined(error) or (rates[best][TESTED] < error and least != percent(error, 1))
     text = " ".join(
         [
             *whole_drive,
@@ -262,14 +262,14 @@ def _next_step(
 
     A threshold is not named if it hardly lowers the error, or if no pixel is road above it.
     """
-    own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
+    error, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
     best = thresholds.get(focus)
     if best and best["threshold"] < 1 and defined(pooled) and pooled - best[TESTED] >= ROUNDING:
         digits = 1 if pooled - best[TESTED] >= FINE else 2
         lines = best.get("lines") or f"threshold = {best['threshold']:.2g}"
         setting = "`, `".join(lines.splitlines())
         yield f"Set `{setting}`: then {in_percent(best[TESTED]):.{digits}f} % are wrong."
-    elif {*rates} <= {FILTERED, UNFILTERED, BASELINE} and defined(own) and own >= WEAK:
+    elif {*rates} <= {FILTERED, UNFILTERED, BASELINE} and defined(error) and error >= WEAK:
         yield "Next: try --variant robust."
 
 

@@ -51,8 +51,8 @@ def run_variant(
     """
     results = tuple(chain.run(view, known))
     outputs = [result.output for result in results]
-    told = () if truth is None else chain.oracles(view, outputs, truth, shadow_truth)
-    return VariantResult(name, results, dict(told))
+    oracle_results = () if truth is None else chain.oracles(view, outputs, truth, shadow_truth)
+    return VariantResult(name, results, dict(oracle_results))
 
 
 def external_layout(name: str, where: str, *, probable: bool = False) -> VariantLayout:
