@@ -371,7 +371,7 @@ class Accounting:
             yield (
                 f"the images' sizes vary: {len(self.odd_sizes)} of the {self.read} are not of the "
                 f"first one's size but {' or '.join(sizes)} (frames {_few(self.odd_sizes)}); "
-                "labels are held against their own images, and the recording shows all images in "
+                "labels are compared with their own images, and the recording shows all images in "
                 "the first one's size"
             )
 
@@ -560,7 +560,7 @@ class FrameStream:
             if count:
                 yield Sentence(
                     "{}{} of the {} labels of {} belong to no frame: the first is {} ms from the "
-                    "nearest, and {} may lie between ({topics.sync_tolerance_ms})",
+                    "nearest, and at most {} are allowed ({topics.sync_tolerance_ms})",
                     shown,
                     count,
                     len(source.pictures),

@@ -17,7 +17,7 @@ def made(request, tmp_path_factory):
 def test_its_version_is_named_and_the_way_out(made, name, command, capsys):
     version, folder = made
     assert main([*command.split(), str(folder / name)]) == 1
-    told = f"made by roadeval {version}, whose format is no longer read: replay the log again\n"
+    told = f"made by roadeval {version} in a format that is no longer read: replay the log again\n"
     out, line = capsys.readouterr()
     assert not out
     assert line.startswith(f"roadeval: error: {folder / name}")
@@ -27,6 +27,6 @@ def test_its_version_is_named_and_the_way_out(made, name, command, capsys):
 
 def test_the_version_that_wrote_a_model_is_named(made):
     version, folder = made
-    told = f"made by roadeval {version}, whose format is no longer read: train it again"
+    told = f"made by roadeval {version} in a format that is no longer read: train it again"
     with pytest.raises(roadeval.RoadevalError, match=told):
         roadeval.load_model(folder / MODEL)

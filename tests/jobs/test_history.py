@@ -127,7 +127,7 @@ def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path)
     assert (event.run, event.before) == (4, 1)
     assert event.reasons[0] == "commit 111111111111 to 555555555555"
     assert len(made.lost) == 3
-    assert "whose format is no longer read" in made.lost[0]
+    assert "in a format that is no longer read" in made.lost[0]
     assert "scores.parquet: damaged" in made.lost[1]
 
 

@@ -28,7 +28,7 @@ Outputs = Annotated[
     list[Path] | None,
     arguments.option(
         "-o --output",
-        "File whose ending is .pdf, .html, .md, .json, or .svg (a badge). Repeatable.",
+        "File that ends in .pdf, .html, .md, .json, or .svg (a badge). Repeatable.",
         "FILE",
         callback=arguments.ending_in(".pdf", ".html", ".md", ".json", ".svg"),
     ),

@@ -81,8 +81,8 @@ def replay(
     Parameters
     ----------
     drive
-        An MCAP file, or a rosbag2 folder of split files; or the URL of one, of which only the parts
-        that are needed are read.
+        An MCAP file, a rosbag2 folder of split files, or the URL of an MCAP file; only the parts of
+        it that are needed are read.
     config
         Every option; the defaults of ``roadeval replay`` otherwise. See `roadeval.configure` and
         `roadeval.load_config`.
@@ -99,7 +99,7 @@ def replay(
     Raises
     ------
     RoadevalError
-        For whatever a user can mend: one line with what is wrong, where, and what to do.
+        For any problem that a user can mend: one line with the problem, its place, and what to do.
     """
     places = {"save": save, "reports": reports, "mcap": mcap}
     places_given = {name: str(path) for name, path in places.items() if path is not None}
@@ -211,7 +211,7 @@ def _finish_recording(
     results: ResultsWriter,
     config: RunConfig,
 ) -> Facts:
-    """Finish the recording; return the facts, of several cameras those of all together."""
+    """Finish the recording; return the facts, for several cameras those of all together."""
     if len(runs) == 1:
         if recorder:
             recorder.finish(ended[0].texts)
@@ -264,7 +264,7 @@ def _record_frames(
 def _recorded_texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:
     """Return the results as the recording keeps them: the files' own text.
 
-    What decides no number is left out, so that the same input gives the same recording.
+    Settings that change no number are left out, so that the same input gives the same recording.
     """
     config = deciding(run.config)
     return {

@@ -26,7 +26,7 @@ CACHE: Final = 16 << 20
 """Bytes of a topic's small messages in memory. A label's stamp is read long before its picture, and
 its chunk, which holds mostly other topics, is no longer in memory then."""
 ENOUGH: Final = 5
-"""Steps from message to message whose median tells a rate."""
+"""Number of steps from message to message from which the rate is computed."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
 
