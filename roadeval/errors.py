@@ -12,10 +12,9 @@ from roadeval.runtime.text import without_secrets
 class RoadevalError(Exception):
     """A known problem: what is wrong, where, and what to do next.
 
-    As text it is one line, in which URLs lose their passwords, and which names settings as Python
-    does. The terminal prints it without a traceback, names settings by their flags, and exits with
-    code 1. Rooms derive their own errors from it; anything else that escapes is a defect of the
-    program.
+    Its text is one line, without the passwords of URLs. It names settings as Python does. The
+    terminal prints it without a traceback, names settings by their flags, and exits with code 1.
+    Rooms derive their own errors from it; anything else that escapes is a defect of the program.
     """
 
     def __init__(
@@ -26,7 +25,7 @@ class RoadevalError(Exception):
         self.where = where if isinstance(where, str) else str(where)
         """The file, topic or frame, from the outside in."""
         self.setting = setting
-        """The setting that is wrong, as ``topics.truth``; empty where it is none."""
+        """The setting that is wrong, such as ``topics.truth``; empty if no setting is wrong."""
         self.remedy = remedy
         """The next step that helps."""
         self.in_file = False
@@ -46,7 +45,7 @@ class RoadevalError(Exception):
         return made
 
     def rename_settings(self, rename: Callable[[str], str]) -> Self:
-        """Return the error with other names of its settings, as of those of another table."""
+        """Return the error with other names of its settings, for example those of another table."""
         made = self.of(self)
         made.setting = rename(self.setting) if self.setting else ""
         for name in ("where", "problem", "remedy"):

@@ -45,23 +45,17 @@ for _name in (*FIRST, *_others):
     app.command(cls=GroupedCommand)(getattr(_module, _name))
 
 
-def _show_version(show: bool) -> None:
-    if show:
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version.")] = False,
+) -> None:
+    """Flight recorder and scoreboard for road recognition."""
+    if version:
         from roadeval.version import VERSION
 
         console.emit(f"{messages.PROGRAM} {VERSION}")
         raise typer.Exit
-
-
-@app.callback(invoke_without_command=True)
-def _root(
-    context: typer.Context,
-    _version: Annotated[
-        bool,
-        typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version."),
-    ] = False,
-) -> None:
-    """Flight recorder and scoreboard for road recognition."""
     if context.invoked_subcommand is None:
         formatter = context.make_formatter()
         cast("Program", context.command).format_start(context, formatter)

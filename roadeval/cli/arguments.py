@@ -129,7 +129,7 @@ def configuration(options: OptionValues) -> RunConfig:
 def _first_brought(config: RunConfig, options: OptionValues) -> RunConfig:
     """Return the configuration with the first variant that was typed as its focus.
 
-    It has no other by itself: by default computed variants come before masks of other methods.
+    By default computed variants come before masks of other methods.
     """
     methods = ("variants", "nets", "topics.masks", "masks")
     names = config.brought()

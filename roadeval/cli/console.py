@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 NARROWEST: Final = 20
 STANDARD: Final = 80
-"""Columns of a terminal. One that claims to be narrower than the first, as by ``COLUMNS``, is taken
-to have the second number."""
+"""Columns of a terminal. One that claims to be narrower than the first, for example because of
+``COLUMNS``, is taken to have the second number."""
 _PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
@@ -80,10 +80,12 @@ class _TrimmedStream:
         self._stream = stream
 
     def write(self, text: str) -> int:
+        """Write a text without the spaces at the ends of its lines."""
         with _output_errors():
             return self._stream.write(_PADDING.sub(r"\1", text))
 
     def flush(self) -> None:
+        """Write the buffered text."""
         with _output_errors():
             self._stream.flush()
 

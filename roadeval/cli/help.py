@@ -11,7 +11,8 @@ from typer.core import TyperCommand, TyperGroup
 from roadeval.cli.options import MOST_USED
 
 WIDEST: Final = 160
-"""Most columns of a help text; a terminal that is wider has longer lines than one can read."""
+"""Greatest number of columns of a help text; a terminal that is wider has longer lines than one can
+read."""
 FLAGS_WIDTH: Final = 27
 """Columns for flags; the meaning of a longer one begins on the next line."""
 START: Final = (
@@ -79,7 +80,7 @@ def _write_groups(command: Any, ctx: Any, formatter: Any) -> None:
             group = getattr(param, "rich_help_panel", None) or "Options"
             if param.param_type_name == "argument":
                 group, flags = "Arguments", param.metavar
-            # Names in a meaning, as of presets, have a line each.
+            # Names in a meaning, such as those of presets, have a line each.
             lines, names = re.subn(r"; (?=\w+: )", "\n", meaning)
             groups.setdefault(group, []).append((flags, f"\b\n{lines}" if names > 1 else meaning))
     if MOST_USED in groups:

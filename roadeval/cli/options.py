@@ -180,7 +180,7 @@ def _help(meaning: str, kind: Any, default: Any) -> str:
 def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:
     """Return the type of what is typed for a value of a type, and the function that reads it.
 
-    ``names`` is the flag and the placeholder of the name in its value, as ``--net NAME``.
+    ``names`` is the flag and the placeholder of the name in its value, such as ``--net NAME``.
     """
     kind = _without_metadata(hint)
     match get_origin(kind):
@@ -235,13 +235,15 @@ def read_named(names: str, text: str, *, alone: bool = False) -> tuple[str, str 
     return name[0], value
 
 
-def _place(option: Option) -> tuple[int, int]:
-    """Return the place of an option in the help: that of its group, and that in the first group."""
-    first = FIRST.index(option.setting) if option.setting in FIRST else 0
-    return GROUPS.index(option.group), first
-
-
-OPTIONS: Final = tuple(sorted(_make_options(), key=_place))
+OPTIONS: Final = tuple(
+    sorted(
+        _make_options(),
+        key=lambda option: (
+            GROUPS.index(option.group),
+            (*FIRST, option.setting).index(option.setting),
+        ),
+    )
+)
 """In the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "topics.image": "--image-topic"

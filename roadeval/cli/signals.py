@@ -31,22 +31,22 @@ def as_exceptions() -> Iterator[None]:
 
     Python accepts handlers from the main thread only; in any other thread nothing changes.
     """
+
+    def stop(number: int, _frame: FrameType | None) -> NoReturn:
+        for stopping in EXIT_CODES:
+            signal.signal(stopping, signal.SIG_IGN)
+        time.sleep(GRACE_S)
+        for stopping in EXIT_CODES:
+            signal.signal(stopping, signal.SIG_DFL)
+        raise Stopped(EXIT_CODES[signal.Signals(number)])
+
     earlier = {}
     # `signal.signal` raises a ValueError outside the main thread.
     with suppress(ValueError):
         for number in EXIT_CODES:
-            earlier[number] = signal.signal(number, _stop)
+            earlier[number] = signal.signal(number, stop)
     try:
         yield
     finally:
         for number, handler in earlier.items():
             signal.signal(number, handler)
-
-
-def _stop(number: int, _frame: FrameType | None) -> NoReturn:
-    for stopping in EXIT_CODES:
-        signal.signal(stopping, signal.SIG_IGN)
-    time.sleep(GRACE_S)
-    for stopping in EXIT_CODES:
-        signal.signal(stopping, signal.SIG_DFL)
-    raise Stopped(EXIT_CODES[signal.Signals(number)])

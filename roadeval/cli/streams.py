@@ -22,23 +22,8 @@ def take_over(*, debug: bool) -> None:
     The program itself reports all that concerns the user. Only the reason of a crash is written;
     with ``debug`` everything is.
     """
-    _fill_closed()
-    encoding = sys.stderr.encoding if sys.stderr else None
-    own_file = BufferedWriter(_LossyFile(os.dup(2), "w"))
-    sys.stderr = TextIOWrapper(own_file, encoding, errors=UNENCODABLE, line_buffering=True)
-    if not debug:
-        _close_to_libraries()
-    if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors=UNENCODABLE)
-    for name in MISLEADING:
-        os.environ.pop(name, None)
-
-
-def _fill_closed() -> None:
-    """Open missing streams, so that no other file gets their numbers.
-
-    Writing to stdout then still fails, as it should.
-    """
+    # Missing streams are opened, so that no other file gets their numbers. Writing to stdout then
+    # still fails, as it should.
     for number, flags in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
             os.fstat(number)
@@ -49,24 +34,29 @@ def _fill_closed() -> None:
                 os.close(opened)
     if sys.stdout is None:
         sys.stdout = os.fdopen(1, "w", closefd=False)
+    encoding = sys.stderr.encoding if sys.stderr else None
+    own_file = BufferedWriter(_LossyFile(os.dup(2), "w"))
+    sys.stderr = TextIOWrapper(own_file, encoding, errors=UNENCODABLE, line_buffering=True)
+    if not debug:
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 2)
+        os.close(null)
+        faulthandler.enable(sys.stderr, all_threads=False)
+        logging.disable()
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore")
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors=UNENCODABLE)
+    for name in MISLEADING:
+        os.environ.pop(name, None)
 
 
 class _LossyFile(FileIO):
     """A file that ignores errors of writing, as a closed stderr must not stop the work."""
 
     def write(self, content: Any) -> int:
+        """Write as much as possible, and report everything as written."""
         try:
             return super().write(content)
         except OSError:
             return len(content)
-
-
-def _close_to_libraries() -> None:
-    """Drop all messages but the program's own and the reason of a crash."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 2)
-    os.close(null)
-    faulthandler.enable(sys.stderr, all_threads=False)
-    logging.disable()
-    if not sys.warnoptions:
-        warnings.simplefilter("ignore")

@@ -54,10 +54,10 @@ def _choose_camera(path: str | Path, document: Mapping[str, Any], topic: str) ->
     """Return the pinhole camera of Kalibr's file that has a topic, or the only one."""
     chain = {name: camera for name, camera in document.items() if "cam" in name}
     topics = {name: str(camera.get("rostopic", "")) for name, camera in chain.items()}
-    names = [name for name, own in topics.items() if own and topic.startswith(f"{own}/")]
+    names = [name for name, begin in topics.items() if begin and topic.startswith(f"{begin}/")]
     name, *others = names or topics
     if others:
-        cameras = ", ".join(f"{name} ({own})" for name, own in topics.items())
+        cameras = ", ".join(f"{name} ({camera_topic})" for name, camera_topic in topics.items())
         choose = Sentence("choose one with {topics.image}")
         raise ConfigError(f"several cameras, {cameras}", where=path, remedy=choose)
     camera: Mapping[str, Any] = chain[name]

@@ -71,10 +71,10 @@ class RunConfig(LogConfig):
     """Every option of a run; a `ConfigError` if they do not go together."""
 
     preset: str = "paper"
-    """The preset to which the other settings are changes."""
+    """The preset that the other settings change."""
     pipeline: Pipeline = field(default_factory=lambda: pipeline_of(None, PRESETS["paper"]))
     """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings; if
-    the preset has no filter, that of a variant with the preset's name."""
+    the preset has no filter, the chain of one variant with the name of the preset."""
     extra: tuple[Variant, ...] = ()
     """Further variants."""
     only: tuple[str, ...] = ()
@@ -149,8 +149,8 @@ class RunConfig(LogConfig):
 
     def brought(self) -> list[str]:
         """Name the variants that were brought beside those of the preset, as in `names`."""
-        given = {variant.name for variant in variants_of(self.pipeline, (), self.preset)}
-        return [name for name in self.names() if name not in given]
+        preset_names = {variant.name for variant in variants_of(self.pipeline, (), self.preset)}
+        return [name for name in self.names() if name not in preset_names]
 
     def check_focus(self, names: Iterable[str]) -> None:
         """Raise a `ConfigError` if the chosen focus is none of these variants."""
@@ -191,7 +191,7 @@ class RunConfig(LogConfig):
     def resolved(self) -> RunConfig:
         """Return the configuration with the settings that stages read from files.
 
-        What was brought is the focus beside a preset that has its name as a variant. A
+        The first variant that the user brought is the focus, also if the preset has no filter. A
         `RoadevalError` if a file cannot be used, or no stage of a variant makes a mask for its
         final stage.
         """
@@ -274,7 +274,7 @@ class RunConfig(LogConfig):
     def input_masks(self) -> set[str]:
         """Return the names of the masks that the variants use as input."""
         settings = (pipeline.settings.get("given") for pipeline in self.pipelines().values())
-        return {given.name for given in settings if given is not None}
+        return {mask.name for mask in settings if mask is not None}
 
     def for_training(self) -> RunConfig:
         """Return the configuration with only those masks from which variants learn."""

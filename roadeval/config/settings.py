@@ -24,7 +24,7 @@ def _labels(labels: object) -> object:
 
     for name, text in labels.items() if isinstance(labels, Mapping) else ():
         if not is_plain(name) or not 0 < len(str(text)) <= 500 or not str(text).isprintable():
-            raise ValueError("must be of letters, digits, - and _, and after = a line of up to 500")
+            raise ValueError("must be NAME=VALUE: letters, digits, - and _, then up to 500 letters")
     return labels
 
 

@@ -86,24 +86,20 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
             problem = f"has no value yet in the line '{unfilled[0].strip()}'"
             raise ConfigError(problem, where=file, remedy="write one in place of the ?") from error
         raise ConfigError(f"{path}: cannot be read as TOML: {error}") from error
-    if not trusted or file.suffix == ".rrd":
-        _refuse_code(tables, path)
-    return tables
-
-
-def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
-    """Raise a `ConfigError` for a chain that names a module, as anybody may have made the file."""
+    if trusted and file.suffix != ".rrd":
+        return tables
     variants = tables.get("variants", {})
     for table in (tables, *(variants.values() if isinstance(variants, Mapping) else ())):
         chain = table.get("chain", ()) if isinstance(table, Mapping) else ()
         for name in chain if isinstance(chain, list) else ():
-            if isinstance(name, str) and ":" in name:
+            if isinstance(name, str) and ":" in name:  # anybody may have made the file
                 raise ConfigError(
                     f"its chain names code, {visible(name)}, which is loaded only from a TOML file "
                     "that you give",
                     where=path,
                     remedy="replay the drive with the run.toml of its results",
                 )
+    return tables
 
 
 def override(settings: Any, values: Any, table: str) -> Any:
@@ -118,7 +114,7 @@ def override(settings: Any, values: Any, table: str) -> Any:
     _check(values, settings, table)
     merged = _merge(dataclasses.asdict(settings), values)
     try:
-        # In JSON a strict check accepts a list for a tuple, but for a number neither text nor true.
+        # In JSON a list passes a strict check as a tuple, but neither text nor true as a number.
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:
@@ -196,9 +192,9 @@ def _merge(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]
 
 def describe_problem(problem: Mapping[str, Any]) -> str:
     """Return the message on a problem that pydantic has found, with the value that was given."""
-    given, context = problem["input"], problem.get("ctx", {})
+    entry, context = problem["input"], problem.get("ctx", {})
     plain = (words for kind, words in PLAIN_WORDS.items() if problem["type"].startswith(kind))
     message = str(context.get("error", problem["msg"]))
     message = next(plain, "{}").format(message, **context)
-    shown = problem["loc"] and not isinstance(given, Mapping)
-    return f"{message} (given: {quote(given)})" if shown else message
+    shown = problem["loc"] and not isinstance(entry, Mapping)
+    return f"{message} (given: {quote(entry)})" if shown else message

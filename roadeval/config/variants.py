@@ -79,7 +79,7 @@ Masks = Mapping[str, MaskSettings]
 
 @dataclass(frozen=True)
 class Variant:
-    """A named method: its pipeline, and the preset to which its settings are changes."""
+    """A named method: its pipeline, and the preset that its settings change."""
 
     name: str
     pipeline: Pipeline
@@ -191,14 +191,14 @@ def _stages_of(chain: Any) -> tuple[Stage, ...]:
         if not isinstance(name, str):
             raise ConfigError(f"there is no stage {name!r}", where="chain", remedy=choice)
     try:
-        found = stages.stages_of(chain)
+        chain_stages = stages.stages_of(chain)
     except stages.UnknownStageError as error:
         raise ConfigError.of(error, "chain") from error
-    if len({stage.name for stage in found}) < len(found):
+    if len({stage.name for stage in chain_stages}) < len(chain_stages):
         raise ConfigError("a stage can occur only once", where="chain")
     if chain[-1] != FINAL_STAGE:
         raise ConfigError(f"chain must end with {FINAL_STAGE}, whose mask is the answer")
-    return tuple(found)
+    return tuple(chain_stages)
 
 
 def check_variant_name(name: str, taken: Collection[str]) -> None:
@@ -275,7 +275,7 @@ def tuned_variant(name: str, method: Pipeline | None) -> Variant:
             )
         dropped = ("threshold", FINAL_STAGE)
         before = tuple(stage for stage in method.chain if stage not in dropped)
-        settings = {s: asdict(own) for s, own in method.settings.items() if s not in dropped}
+        settings = {s: asdict(values) for s, values in method.settings.items() if s not in dropped}
     exposure = () if "exposure" in before else ("exposure",)
     chain = (*before, *exposure, "trees", FINAL_STAGE)
     tables = {"preset": "robust", "chain": chain, **settings, "trees": {"opinion": True}}

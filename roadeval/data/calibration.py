@@ -18,7 +18,7 @@ class Mounting:
     """The place of a camera in the frame at the root of the log's transforms."""
 
     parent: str
-    """The root frame's name, as ``base_link``."""
+    """The root frame's name, such as ``base_link``."""
     translation: tuple[float, ...]
     """The camera's place in the root frame: x, y, z in metres."""
     rotation: tuple[float, ...]
@@ -42,7 +42,7 @@ class Calibration:
     matrix: tuple[float, ...]
     """The nine numbers of K, row by row: focal lengths and principal point in pixels."""
     model: str = ""
-    """The model of the distortion, as ``plumb_bob``; empty if it has no name."""
+    """The model of the distortion, such as ``plumb_bob``; empty if it has no name."""
     distortion: tuple[float, ...] = ()
     frame_id: str = ""
     """The camera's name in the log's transforms."""
@@ -88,7 +88,7 @@ class Calibration:
         return any(self.distortion) or self.model.lower() in FISHEYE
 
     def has_shape(self, width: int, height: int) -> bool:
-        """Return whether images of this size have the same shape, give or take a pixel."""
+        """Return whether images of this size have the same shape, to within a pixel."""
         off = abs(self.width * height - self.height * width)
         return off <= max(self.width + self.height, width + height)
 

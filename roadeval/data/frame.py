@@ -78,7 +78,7 @@ class Frame:
     classes: Classes | None = None
     """The classes of the truth's pixels, by their codes; None if the truth has no classes."""
     name: str = ""
-    """The name of its image, as ``umm_000012``, if the log has it."""
+    """The name of its image, such as ``umm_000012``, if the log has it."""
     calibration: Calibration | None = None
     """Its own calibration and mounting, if each image of the log has one."""
 

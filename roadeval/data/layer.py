@@ -42,19 +42,20 @@ class LayerSpec:
     """The description of a layer, known before the first frame."""
 
     name: str
-    """Last part of the entity path, as ``ndi`` in ``/filtered/ndi``."""
+    """Last part of the entity path, such as ``ndi`` in ``/filtered/ndi``."""
     kind: LayerKind
     title: str
-    """A few words for people, as ``NDI (Eq. 6)``."""
+    """A few words for people, such as ``NDI (Eq. 6)``."""
     classes: tuple[LabelClass, ...] = ()
     """For `LABELS` and `MASK`: the values that occur."""
     value_range: tuple[float, float] = (0.0, 1.0)
     """For `SCALAR`: the closed range of meaning; values outside are clipped for display."""
     exact: bool = True
     """Whether the recording must give back the same array (masks, labels, colours). A scalar map
-    comes back as the nearest of 256 levels over ``value_range``; if the image has more than 800
-    columns, as the means of blocks of pixels, of 400 columns at most, to 1/127 of half the range. A
-    layer that is not exact is recorded with some loss, at half the resolution or as small as that.
+    comes back as the nearest of 256 levels over ``value_range``. If the image has more than 800
+    columns, it comes back as means of blocks of pixels, in at most 400 columns, to 1/127 of half
+    the range. A layer that is not exact is recorded with some loss, and at half the resolution or
+    less.
     """
     photographic: bool = False
     """For `SCALAR`: whether it varies as a photograph does, without plateaus of one value. The

@@ -133,7 +133,7 @@ class VariantResult:
     """The outputs of a variant's stages for one frame, in the order they ran.
 
     ``oracles`` has the road masks that the later stages make after a stage is replaced by the
-    truth, by both names. They are no results: see `roadeval.pipeline.chain.Chain`.
+    truth, by the names of both stages. They are no results: see `roadeval.pipeline.chain.Chain`.
     """
 
     variant: str
@@ -212,13 +212,14 @@ class FrameMetres:
 class FrameResult:
     """Everything about one replayed frame that is recorded or written to tables.
 
-    ``tallies`` is empty unless the frame is evaluated, ``doubts`` unless it has no truth.
+    ``tallies`` is empty if the frame is not evaluated, and ``doubts`` if it has truth.
     ``truth_bits`` is the truth of the counts. ``changes`` are from stage to stage and from final
     mask to final mask. ``contours``, and ``metres`` if the camera is known, measure final masks by
     variant. ``histograms`` count labelled pixels by their probability of road, for each variant and
     stage with one, and ``above`` does so for the ground seen from above. ``oracles`` are the counts
-    of later stages after one is replaced by the truth, by that one. ``disturbed`` has the final
-    masks of the disturbed frame, by the disturbance as ``fog:2``. ``notes`` are sentences.
+    of later stages after one stage is replaced by the truth, by the name of the replaced stage.
+    ``disturbed`` has the final masks of the disturbed frame, by the name of the disturbance, such
+    as ``fog:2``. ``notes`` are sentences.
     """
 
     frame: Frame

@@ -31,20 +31,20 @@ RIGHT: Final = "right_edge"
 FREE: Final = "free_distance"
 """Measures of a mask's ends."""
 STEP: Final = 0.004
-"""Metres between places of a line, at which the pixels that it crosses are looked up."""
+"""Metres between the places of a line; the pixels that it crosses are looked up there."""
 FARTHEST: Final = 4000
 """Greatest number of places of a line."""
 GAP: Final = 0.3
-"""A gap in the road of fewer metres across is no edge; ahead, of fewer than `GAP_AHEAD`."""
+"""A gap in the road of fewer metres is no edge; straight ahead the limit is `GAP_AHEAD`."""
 GAP_AHEAD: Final = 0.5
 LEVELS: Final = 256
-"""Thresholds of KITTI's road benchmark, whose confidences have eight bits."""
+"""Thresholds of KITTI's road benchmark; its confidences have eight bits."""
 Pixels = npt.NDArray[np.intp]
 """``(n,)``: places in a flat image, or `OUTSIDE`."""
 
 
 def plan_of(ground: Ground, settings: EvaluationSettings) -> Plan:
-    """Return the ground seen from above whose cells are counted."""
+    """Return the view of the ground from above in which cells are counted."""
     return Plan(ground, *settings.plan, settings.plan_width, settings.plan_cell)
 
 
@@ -74,7 +74,7 @@ class Survey:
 
     @property
     def stances(self) -> int:
-        """Number of `STANCES` that are counted: only the first if a homography is all there is."""
+        """Number of `STANCES` that are counted: only the first without a posed ground."""
         return len(STANCES) if self.ground.is_posed else 1
 
     @cached_property
@@ -135,8 +135,8 @@ class Survey:
     def digits(self) -> list[Bits]:
         """The binary digits of each pixel's number of cells, ``(H, words)`` each.
 
-        The least digit of a stance is its first. The sum over digits of the pixels that have it,
-        times its worth, is the number of cells.
+        The lowest digit of a stance comes first. The number of cells of some pixels is a sum over
+        the digits: the number of the pixels that have the digit, times its value.
         """
         digits = range(max(1, int(self._cells.max()).bit_length()))
         return [pack((cells >> digit) & 1) for cells in self._cells for digit in digits]
@@ -145,7 +145,7 @@ class Survey:
     def _lines(self) -> list[_Line]:
         """The lines along which a road's ends are searched, for each stance.
 
-        They lie across at each distance, and the last one straight ahead.
+        One lies across the road at each distance, and the last one lies straight ahead.
         """
         settings = self._settings
         half = settings.plan_width / 2
@@ -281,7 +281,7 @@ def _sides(
 
 
 def _free(runs: Runs, start: int, cap: float, borders: list[float], nothing: float) -> float:
-    """Return where the road from a pixel on ends, in metres, at most ``cap``; else ``nothing``."""
+    """Return the metres where the road ahead of a pixel ends, at most ``cap``; else ``nothing``."""
     for first, stop in _join_runs(runs, borders, GAP_AHEAD):
         if first <= start < stop:
             return min(borders[stop], cap)

@@ -26,9 +26,9 @@ class Metric:
     """A number that is computed from the counts of one mask."""
 
     name: str
-    """Column of the tables, as ``ERR``."""
+    """Column of the tables, such as ``ERR``."""
     title: str
-    """A few words for a person, as ``error rate``."""
+    """A few words for a person, such as ``error rate``."""
     formula: str
     """Formula in ``TP``, ``TN``, ``FP``, ``FN`` and ``N``."""
     function: Callable[[Counts], float]

@@ -42,7 +42,7 @@ class Region(NamedTuple):
     """Computes the regions that a frame has, ``(H, words)`` each, by name."""
 
     def titles_of(self, names: Collection[str], height: int = 0) -> Mapping[str, str]:
-        """Return the titles of some names, as far as it has them, in order."""
+        """Return the titles of those names that it has, in order."""
         if callable(self.titles):
             return self.titles(names, height)
         return {name: title for name, title in self.titles.items() if name in names}

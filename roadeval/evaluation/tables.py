@@ -1,7 +1,7 @@
 """Tables of counted masks, summed up: totals, windows, pairs, worst frames. A table is a DataFrame.
 
 Rows are those of `roadeval.results.schema.TABLES`, of one drive or of any number. Columns such as
-`KEY` and `MASK` name what is summed up apart, and all follows from the four counts of a row.
+`KEY` and `MASK` name the groups of the sums, and everything follows from the four counts of a row.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def rates_of(
 ) -> pd.DataFrame:
     """Compute a column for each metric from each row's counts; NaN if it is undefined.
 
-    With ``end`` the columns of counts end so, as ``TP_base`` does, and so do those of metrics.
+    With ``end`` the names of the columns of counts and metrics end in it, as ``TP_base`` does.
     """
     import pandas as pd
 

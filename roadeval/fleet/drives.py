@@ -119,7 +119,7 @@ class DriveEntry:
     group: str | None = None
     """The same for drives that share a day or a route; None for a single drive."""
     tags: Mapping[str, str] = field(default_factory=dict)
-    """Facts about it, as ``{"weather": "rain"}``."""
+    """Facts about it, such as ``{"weather": "rain"}``."""
     settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
     """Its own settings, in place of those of all drives, see `RunConfig.of_drive`."""
 
@@ -194,7 +194,7 @@ def entry_of(
 
 
 def is_usable(name: str) -> bool:
-    """Return whether the name of a file or folder is not hidden, and not that of a partial one."""
+    """Return whether a file or folder is neither hidden nor partial, by its name."""
     is_hidden = name.startswith(".") or name in SYSTEM_FOLDERS
     return not is_hidden and PurePath(name.lower()).suffixes[-2:-1] != [".partial"]
 
@@ -233,7 +233,7 @@ def is_bag(folder: Path) -> bool:
 
 
 def natural_path(path: PurePath) -> list[Any]:
-    """Sort key by which ``monday/drive_2`` comes before ``monday/drive_10``."""
+    """Sort key that puts ``monday/drive_2`` before ``monday/drive_10``."""
     return [(natural(Path(part)), part) for part in path.parts]
 
 
@@ -312,7 +312,15 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     """
     first_of: dict[tuple[str, str], DriveEntry] = {}
     bare: tuple[Any, ...] = (None, {}, {})
-    for entry in (entry for word in words for entry in _drives_of(word)):
+    entries: list[DriveEntry] = []
+    for word in words:
+        with reading(visible(word), FleetError):
+            path = Path(word)
+            if is_url(word) or path.suffix != MANIFEST or not path.is_file():
+                entries += map(entry_of, _sources(word, Path()))
+            else:
+                entries += read_manifest(path)
+    for entry in entries:
         place = entry.source if entry.path is None else os.path.realpath(entry.path)
         first = first_of.setdefault((place, entry.camera), entry)
         if first.description == bare != entry.description:
@@ -323,15 +331,6 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     if not first_of:
         raise FleetError("no drive found", remedy="name logs, folders of logs, URLs or a manifest")
     return name_cameras([*first_of.values()])
-
-
-def _drives_of(word: str) -> Iterator[DriveEntry]:
-    with reading(visible(word), FleetError):
-        path = Path(word)
-        if is_url(word) or path.suffix != MANIFEST or not path.is_file():
-            yield from map(entry_of, _sources(word, Path()))
-        else:
-            yield from read_manifest(path)
 
 
 def _sources(word: str, base: Path) -> list[str]:

@@ -55,7 +55,8 @@ def start_workers(
         The number of processes that are started, by default one per processor. A process that takes
         more than its share of the machine's memory is ended, which costs its drive one attempt.
     scheduler
-        The address of a Dask scheduler, as ``tcp://host:8786``, or the file that it has written.
+        The address of a Dask scheduler, such as ``tcp://host:8786``, or the file that it has
+        written.
     """
     import dask.system
     import distributed

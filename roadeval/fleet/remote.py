@@ -16,8 +16,9 @@ import re
 import shutil
 import zlib
 from base64 import b64encode
-from collections.abc import Callable
-from concurrent.futures import wait
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cache, partial
 from os import PathLike
@@ -36,6 +37,7 @@ from roadeval.fleet.drives import (
     public_source,
     scheme_of,
 )
+from roadeval.logs.container.records import FarFile
 from roadeval.logs.log import RemoteLog, Traffic
 from roadeval.results.facts import FETCHED, FLEET, SUMMARY
 from roadeval.runtime.threads import in_thread
@@ -49,9 +51,13 @@ PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 PART: Final = 64 << 10
-"""Fewest bytes that are read at once: the message indexes of a chunk, and the next chunk's head."""
+"""Fewest bytes of a part that nobody expected, and most between two that are read as one."""
 TAIL: Final = 128 << 10
-"""Bytes at the end that are read at once, and kept: the summary of a log of one gigabyte."""
+"""Bytes at the end that are read at once: the summary of a log of one gigabyte."""
+AT_ONCE: Final = 16
+"""Parts that are read ahead at once; as many that were read are kept."""
+PIECE: Final = 1 << 20
+"""Most bytes of a part that is read ahead or kept."""
 ROOM: Final = 2 << 30
 """Bytes of a result that are fetched, and unpacked, at most."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
@@ -153,67 +159,122 @@ class _FileState(NamedTuple):
         return self.size != other.size or (one != two and "" not in (one, two)) or is_later
 
 
-class _RemoteFile:
+@dataclass(slots=True)
+class _Part:
+    """Bytes of a file, and the server's answer if it was asked for them."""
+
+    begin: int
+    end: int
+    answer: Future[tuple[_FileState, bytearray]] | None = None
+
+
+class _RemoteFile(FarFile):
     """A file elsewhere that is read in parts; a `FleetError` if it changes meanwhile."""
 
     def __init__(self, place: _Place, state: _FileState) -> None:
         self._place, self._state, self._size, self._at = place, state, state.size, 0
         tag = state.tag
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
-        self._begin, self._part, self._tail = 0, b"", b""
+        place.traffic.total = self._size
+        self._parts: list[_Part] = []
+        """Parts that were read or passed by, and then those that are expected."""
+        self._next = 0
+        """The position of the first of these that is expected."""
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + (self._size if whence == os.SEEK_END else 0)
         return self._at
 
     def read(self, size: int) -> bytes:
-        begin, end = self._at, min(self._at + size, self._size)
-        tail = max(self._size - TAIL, 0)
-        if begin >= tail:
-            self._tail = self._tail or self._fetch(tail, self._size)
-            self._at = max(begin, end)
-            return self._tail[begin - tail : self._at - tail]
-        if not self._begin <= begin <= end <= self._begin + len(self._part):
-            self._part = self._fetch(begin, min(max(end, begin + PART), self._size))
-            self._begin = begin
+        begin, end, content = self._at, min(self._at + size, self._size), bytearray()
         self._at = max(begin, end)
-        return self._part[begin - self._begin : self._at - self._begin]
+        while begin < end:
+            part = self._part(begin, end)
+            content += self._content(part)[begin - part.begin : end - part.begin]
+            begin = part.end
+        return bytes(content)
 
-    def _fetch(self, begin: int, end: int) -> bytes:
+    def expect(self, parts: Iterable[tuple[int, int]]) -> None:
+        asked, expected = [part for part in self._parts if part.answer], list[_Part]()
+        held = sorted((part.begin, part.end) for part in asked)
+        for begin, stop in dict.fromkeys(parts):
+            end, held_until = min(stop, self._size), begin
+            for first, last in held:
+                held_until = last if first <= held_until < last else held_until
+            if held_until >= end:
+                continue
+            before = expected[-1] if expected else _Part(end, end)
+            if before.begin <= begin <= before.end + PART and end <= before.begin + PIECE:
+                before.end = max(before.end, end)
+            else:
+                expected += [_Part(at, min(at + PIECE, end)) for at in range(begin, end, PIECE)]
+        self._parts, self._next = asked + expected, len(asked)
+        self._read_ahead()
+
+    def _read_ahead(self) -> None:
+        """Forget parts that were passed long ago, and ask for those that are expected soon."""
+        del self._parts[: max(self._next - AT_ONCE, 0)]
+        self._next = min(self._next, AT_ONCE)
+        for part in self._parts[: self._next + AT_ONCE]:
+            self._ask_for(part)
+
+    def _part(self, begin: int, end: int) -> _Part:
+        """Return a part that holds a byte, and perhaps those up to another."""
+        place = next((n for n, p in enumerate(self._parts) if p.begin <= begin < p.end), -1)
+        if 0 <= place < self._next + AT_ONCE:
+            part = self._parts[place]
+            self._next = max(self._next, place + 1)
+        else:
+            # The file's end is read at once, and a byte more, as a chunk's last one is read alone.
+            first, last = min(begin, max(self._size - TAIL, 0)), max(end + 1, begin + PART)
+            part = self._parts.pop(place) if place >= 0 else _Part(first, min(last, self._size))
+            if part.end - part.begin <= PIECE:
+                self._parts.insert(self._next, part)
+                self._next += 1
+        self._read_ahead()
+        return part
+
+    def _ask_for(self, part: _Part) -> Future[tuple[_FileState, bytearray]]:
+        if part.answer is None:
+            self._place.traffic.requests += 1
+            self._place.traffic.bytes += part.end - part.begin
+            part.answer = in_thread(partial(self._fetch, part.begin, part.end))
+        return part.answer
+
+    def _fetch(self, begin: int, end: int) -> tuple[_FileState, bytearray]:
         import obstore
 
-        if begin >= end:
-            return b""
         options = {"range": (begin, end), **self._options}
+        answer = obstore.get(self._place.store, self._place.key, options=options)
+        content = bytearray()
+        for piece in answer.stream(min_chunk_size=1 << 20):
+            content += piece
+            if len(content) > end - begin:  # the stream may never end
+                break
+        return _FileState.of(answer.meta), content
 
-        def read_part() -> tuple[_FileState, bytes]:
-            answer = obstore.get(self._place.store, self._place.key, options=options)
-            content = bytearray()
-            for piece in answer.stream(min_chunk_size=1 << 20):
-                content += piece
-                if len(content) > end - begin:  # the stream may never end
-                    break
-            return _FileState.of(answer.meta), bytes(content)
-
+    def _content(self, part: _Part) -> bytearray:
+        """Wait for a part, and return its bytes."""
         where = public_source(self._place.url)
         try:
-            state, content = _ask(self._place.url, read_part)
+            state, content = _wait_for(self._place.url, self._ask_for(part))
         except FleetError as error:
             if error.problem != NO_PARTS:
                 raise
             problem = "the server gives no parts of files"
             raise FleetError(problem, where=where, remedy="copy the file here") from None
-        self._place.traffic.requests += 1
-        self._place.traffic.bytes += len(content)
         if state.differs(self._state):
             raise FleetError(CHANGED, where=where)
-        if len(content) != end - begin:
-            problem = "ended early" if len(content) < end - begin else "the server sends too much"
+        if len(content) != part.end - part.begin:
+            is_short = len(content) < part.end - part.begin
+            problem = "ended early" if is_short else "the server sends too much"
             raise FleetError(problem, where=where)
         return content
 
     def close(self) -> None:
-        self._part = self._tail = b""
+        # A thread in the midst of an answer may outlive the interpreter.
+        wait([part.answer for part in self._parts if part.answer], _POLL_S)
+        self._parts, self._next = [], 0
 
 
 def stamp(url: str, patience_s: float = PATIENCE_S) -> tuple[int, str | None]:
@@ -287,7 +348,11 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
 
     It runs in its own thread, as obstore does not notice Ctrl-C while it waits for a server.
     """
-    answer = in_thread(lambda: function(*arguments, **options))
+    return _wait_for(url, in_thread(lambda: function(*arguments, **options)))
+
+
+def _wait_for(url: str, answer: Future[Answer]) -> Answer:
+    """Wait for the answer of a thread, whose errors are those of `_ask`."""
     # The wait is divided, as a signal that another thread receives does not end one long wait.
     while not wait([answer], _POLL_S).done:
         pass

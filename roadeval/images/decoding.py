@@ -32,8 +32,8 @@ _SCAN: Final = b"\xff\xda"
 _TWELVE_BITS: Final = re.compile(rb"\xff[\xc0-\xc2]\x00[\x0b\x11]\x0c", re.DOTALL)
 """The head of a JPEG frame of one or three colours with 12 bits a sample."""
 MOST_SCANS: Final = 100
-"""Most scans of a JPEG, as in libtiff; encoders write about ten. A scan of a few bytes can make the
-decoder walk through the image: 200 kB of scans would take over a minute."""
+"""Greatest number of scans of a JPEG, as in libtiff; encoders write about ten. A scan of a few
+bytes can make the decoder walk through the image: 200 kB of scans would take over a minute."""
 
 
 def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
@@ -63,7 +63,7 @@ def deep_samples(data: File, limits: Limits) -> Array | None:
 
 
 def _deep_colours(data: File) -> Array | None:
-    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits, of which Pillow would keep eight.
+    """Return the ``(H, W, 3)`` colours of a PNG of 16 bits; Pillow would keep eight.
 
     None for any other file. An `ImageError` if it is damaged.
     """
@@ -109,7 +109,7 @@ def _label_values(image: Any) -> Array:
             return opacity
         if np.intersect1d(packed[clear], packed[~clear]).size:
             raise ImageError(
-                "a label image of which one colour is transparent in parts: save it without "
+                "a label image with one colour that is transparent in parts: save it without "
                 "transparency"
             )
     return without_colours(colours)
@@ -124,7 +124,7 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
 
 
 def without_colours(image: Rgb) -> Array:
-    """Return one channel of an image whose three are equal, else the image itself."""
+    """Return one channel of an image if its three channels are equal, else the image itself."""
     grey = image[..., 0]
     same = np.array_equal(grey, image[..., 1]) and np.array_equal(grey, image[..., 2])
     return np.ascontiguousarray(grey) if same else image
@@ -211,7 +211,7 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     try:
         height, width, *_ = simplejpeg.decode_jpeg_header(data)
     except (ValueError, KeyError) as error:  # KeyError for an unknown subsampling
-        what = "a JPEG whose head is damaged, or of a rare chroma subsampling"
+        what = "a JPEG with a damaged head or a rare chroma subsampling"
         raise _jpeg_error(data, what) from error
     return width, height
 
@@ -245,7 +245,7 @@ def _decode(data: File, limits: Limits) -> Any:
 
 
 def _opened(data: File, format_: ImageFormat) -> Any:
-    """Return an image of Pillow's, of which only the head is read."""
+    """Return an image of Pillow; only its head is read."""
     _silence_pillow()
     module = import_module(f"PIL.{format_.plugin}ImagePlugin")
     return getattr(module, f"{format_.plugin}ImageFile")(io.BytesIO(data))

@@ -27,8 +27,8 @@ Light = npt.NDArray[np.float32]
 """Linear light, ``(H, W, 3)``, or a number a pixel, ``(H, W)``."""
 
 FAR, SKY = 80.0, 300.0
-"""Metres beyond which what stands on the ground hides it (1/d^2 = 1/ground^2 + 1/FAR^2), and to
-the sky."""
+"""Metres beyond which objects hide the ground (1/d^2 = 1/ground^2 + 1/FAR^2), and metres to the
+sky."""
 ROOFS: Final = 6.0
 """How far houses and trees reach above the camera, by its height above the ground."""
 WELL, READ_NOISE = 4096.0, 3.0
@@ -55,12 +55,12 @@ def to_codes(light: Light) -> Rgb:
 
 Random = np.random.Generator
 Apply = Callable[[Rgb, float, Light, Random], Rgb]
-"""A function of the image, the strength, the depth, and what is drawn at random.
+"""A function of the image, the strength, the depth, and the random generator.
 
 The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN where not known."""
 
 
-def _exposure(image: Rgb, stops: float, *_: object) -> Rgb:
+def exposure(image: Rgb, stops: float, *_: object) -> Rgb:
     """Multiply the light by 2^stops, and clip it at white."""
     return np.take(to_codes(_LIGHT_OF * np.float32(2**stops)), image)
 
@@ -72,12 +72,12 @@ def _noisy(light: Light, well: float, random: Random) -> Rgb:
     return to_codes(light + deviation * drawn / np.float32(well))
 
 
-def _noise(image: Rgb, strength: float, _: Light, random: Random) -> Rgb:
+def noise(image: Rgb, strength: float, _: Light, random: Random) -> Rgb:
     """Add the noise of a sensor whose white pixel holds 4096 / 4^(strength - 1) electrons."""
     return _noisy(to_light(image), WELL * 4 ** (1 - strength), random)
 
 
-def _dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
+def dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
     """Divide the light by 2^stops before it falls on the sensor, whose noise stays."""
     return _noisy(to_light(image) * np.float32(2**-stops), WELL, random)
 
@@ -85,7 +85,7 @@ def _dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
 def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float32]:
     """Fade light into the air's, L t + A (1 - t) with t = exp(-b d) (Koschmieder, 1924).
 
-    A is 0.6 of the brightest hundredth of the image; above the horizon what is bright is sky.
+    A is 0.6 of the brightest hundredth of the image; bright pixels above the horizon are sky.
     Returned is also A.
     """
     grey = light.mean(axis=2)
@@ -98,12 +98,12 @@ def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float
     return air + (light - air) * through[..., None], air
 
 
-def _fog(image: Rgb, strength: float, depth: Light, _: Random) -> Rgb:
+def fog(image: Rgb, strength: float, depth: Light, _: Random) -> Rgb:
     """Fade in fog of 200 m / strength of visibility V: b = -ln 0.05 / V (WMO-No. 8, chapter 9)."""
     return to_codes(_veil(to_light(image), -math.log(0.05) * strength / 200, depth)[0])
 
 
-def _blur(image: Rgb, strength: float, *_: object) -> Rgb:
+def blur(image: Rgb, strength: float, *_: object) -> Rgb:
     """Put the lens out of focus: a point is a disk of light, of radius width / 320 x strength."""
     import cv2
 
@@ -127,7 +127,7 @@ def _spots(height: int, width: int, strength: float) -> Light:
     return (1 - clear).astype(np.float32)
 
 
-def _dirt(image: Rgb, strength: float, *_: object) -> Rgb:
+def dirt(image: Rgb, strength: float, *_: object) -> Rgb:
     """Look through 12 soft spots a strength, which dim and scatter light (Gu et al., 2009, eq. 2).
 
     A covered pixel keeps a fifth of its light, and gets a quarter of the image's mean.
@@ -137,7 +137,7 @@ def _dirt(image: Rgb, strength: float, *_: object) -> Rgb:
     return to_codes(light + (scattered - np.float32(0.8) * light) * covered)
 
 
-def _rain(image: Rgb, strength: float, depth: Light, random: Random) -> Rgb:
+def rain(image: Rgb, strength: float, depth: Light, random: Random) -> Rgb:
     """Fade as in rain of R = 25 mm/h x strength, b = 0.312 R^0.67 / km (Halder et al., 2019).
 
     Then 300 streaks a strength, near ones longer: L (1 - a) + A a, with the light A of the air,
@@ -158,7 +158,7 @@ def _rain(image: Rgb, strength: float, depth: Light, random: Random) -> Rgb:
     return to_codes(light + (air - light) * part)
 
 
-def _jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
+def jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
     """Compress as a JPEG of this quality, as libjpeg counts it."""
     import cv2
 
@@ -178,14 +178,14 @@ class DisturbanceKind(NamedTuple):
 
 
 BUILT_IN: Final = (
-    DisturbanceKind("dark", "stops of less light", _dark, 0, 12),
-    DisturbanceKind("fog", "200 m over the visibility", _fog, 0, 20),
-    DisturbanceKind("blur", "radius in 1/320 of the width", _blur, 0, 20),
-    DisturbanceKind("dirt", "dozens of spots on the lens", _dirt, 0, 10),
-    DisturbanceKind("rain", "25 mm/h", _rain, 0, 10),
-    DisturbanceKind("jpeg", "quality, of which less is worse", _jpeg, 1, 100),
-    DisturbanceKind("noise", "gain as a power of 4", _noise, 0, 6),
-    DisturbanceKind("exposure", "stops of more light, or less", _exposure, -10, 10),
+    DisturbanceKind("dark", "stops of less light", dark, 0, 12),
+    DisturbanceKind("fog", "200 m over the visibility", fog, 0, 20),
+    DisturbanceKind("blur", "radius in 1/320 of the width", blur, 0, 20),
+    DisturbanceKind("dirt", "dozens of spots on the lens", dirt, 0, 10),
+    DisturbanceKind("rain", "25 mm/h", rain, 0, 10),
+    DisturbanceKind("jpeg", "quality; a lower one is worse", jpeg, 1, 100),
+    DisturbanceKind("noise", "gain as a power of 4", noise, 0, 6),
+    DisturbanceKind("exposure", "stops of more light, or less", exposure, -10, 10),
 )
 
 
@@ -209,7 +209,7 @@ class Disturbance(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Disturbance:
-        """Read ``KIND:STRENGTH``; a `SettingError` with what is allowed if it is none."""
+        """Read ``KIND:STRENGTH``; a `SettingError` that lists the allowed ones if it is none."""
         kind, _, number = text.strip().lower().partition(":")
         if (allowed := kinds().get(kind)) is None:
             remedy = f"{likely(kind, kinds())}choose {', '.join(kinds())} (as fog:2)"
@@ -222,7 +222,7 @@ class Disturbance(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its name in tables and paths, as ``fog-2``."""
+        """Its name in tables and paths, such as ``fog-2``."""
         sign = "" if not self.is_signed else "minus" if self.strength < 0 else "plus"
         return f"{self.kind}-{sign}{abs(self.strength):g}".replace(".", "_")
 
@@ -251,7 +251,7 @@ class Disturbance(NamedTuple):
 
 @lru_cache(4)
 def assumed_depth(height: int, width: int) -> Light:
-    """Return the metres to flat ground by row, h f / (row - horizon), of a camera as in many cars.
+    """Return the metres to flat ground by row, h f / (row - horizon), of a camera of a usual car.
 
     It is at h = 1.4 m, with f = 0.8 of the width and the horizon at 45 % of the height.
     """

@@ -11,7 +11,7 @@ from roadeval.runtime.sentence import Sentence
 Size = tuple[int, int]
 """Width and height in pixels."""
 MAX_PIXELS: Final = 1 << 25
-"""Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
+"""Greatest number of pixels of an image by default: 33.6 million, a little more than 7680x4320."""
 
 
 class ImageError(RoadevalError, ValueError):
@@ -23,7 +23,8 @@ class Limits:
     """The largest size of an image, and rules for decoding it."""
 
     max_pixels: int = MAX_PIXELS
-    """Most pixels. The head of an image tells its size, so larger ones are not decoded."""
+    """Greatest number of pixels. The head of an image tells its size, so larger ones are not
+    decoded."""
     turn: bool = False
     """Whether an image is turned by its EXIF orientation, as in viewers."""
     full_range: bool = False

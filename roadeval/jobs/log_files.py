@@ -36,9 +36,9 @@ def info(
     config
         What a replay would be asked for.
     verify
-        Whether the log is read whole, so that all damage is found; one of at most 50 MB on a disk
-        is in any case. Of one behind a URL only the summary and the first messages are read
-        otherwise, if it has a summary.
+        Whether the log is read whole, so that all damage is found; a log of at most 50 MB on a disk
+        always is. Otherwise only the summary and the first messages of a log behind a URL are read,
+        if it has a summary.
     on_progress
         Called now and then while the log is read whole, in megabytes.
 

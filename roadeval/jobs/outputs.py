@@ -42,7 +42,8 @@ class Outputs:
     def of(cls, settings: OutputSettings, drive: str) -> Outputs:
         """Return the places of a drive's results: from the settings, or by its name.
 
-        The folder is named as the recording, where that is named: no other run's is replaced.
+        The folder has the name of the recording, if that is named: no folder of another run is
+        replaced.
         """
         saved = Path(settings.save or Path("recordings", f"{drive}.rrd"))
         name = (saved.stem if settings.save else drive).strip(".") or drive
@@ -69,15 +70,20 @@ def holding(
 ) -> Iterator[bool]:
     """Hold the files that a command writes, and its results folder, if it writes one.
 
-    What earlier runs have left of them is removed. Yields whether it is certain that no other run
-    writes them. A `RoadevalError` if one is an input or another output, cannot be written, or is
-    being written by another run.
+    Leftovers of earlier runs are removed. Yields whether it is certain that no other run writes
+    them. A `RoadevalError` if one is an input or another output, cannot be written, or is being
+    written by another run.
     """
     paths = [Path(file) for file in files if file is not None]
     outputs = [*paths, *([folder] if folder else [])]
     # For a loop of links pathlib raises an error of its own.
     places = [os.path.realpath(path) for path in outputs]
-    taken = {os.path.realpath(place) for path in inputs if path for place in _places(Path(path))}
+    taken = set[str]()
+    for path in (Path(file) for file in inputs if file):
+        names: Iterable[str] = FILES if is_fleet(path) else ()
+        if not names and (path / SUMMARY).is_file():
+            names = names_of_results(path / SUMMARY)
+        taken |= {os.path.realpath(file) for file in (path, *(path / name for name in names))}
     for number, path in enumerate(outputs):
         earlier = places[:number] if path is folder else {*places[:number], *taken}
         if places[number] in earlier:
@@ -89,15 +95,6 @@ def holding(
         if folder:
             certain.append(_claim(claims, folder, claim_folder(folder, CONTENT)))
         yield all(certain)
-
-
-def _places(path: Path) -> Iterator[Path]:
-    """Yield the path of an input and of the files by which a folder is a result or a fleet."""
-    yield path
-    if is_fleet(path):
-        yield from (path / name for name in FILES)
-    elif (path / SUMMARY).is_file():
-        yield from (path / name for name in names_of_results(path / SUMMARY))
 
 
 def _claim(claims: ExitStack, path: Path, claim: AbstractContextManager[bool]) -> bool:

@@ -42,6 +42,7 @@ def _require(array: npt.NDArray[Any], *shape: int) -> None:
 
 
 def look_up_sum_min(planes: Planes, table: Plane) -> tuple[Plane, Sums]:
+    """Look every pixel up by the sum and the minimum of its channels."""
     _require(table, 766, 256)
     height, width = _shape(*planes)
     codes, histogram = np.empty((height, width), np.uint8), np.empty(256, np.int64)
@@ -53,6 +54,7 @@ def look_up_sum_min(planes: Planes, table: Plane) -> tuple[Plane, Sums]:
 def mahalanobis(
     planes: Planes, mean: Floats, whitening: Floats, greatest: float
 ) -> tuple[Values, Plane]:
+    """Compute the distance of Eq. 2 of every pixel, and which pixels are near."""
     _require(mean, 3)
     _require(whitening, 3, 3)
     shape = _shape(*planes)
@@ -62,6 +64,7 @@ def mahalanobis(
 
 
 def look_up_colours(planes: Planes, road: arrays.Words) -> Plane:
+    """Look every pixel up in a table over all colours, a bit each."""
     _require(road, COLOUR_WORDS)
     height, width = _shape(*planes)
     result = np.empty((height, width), np.uint8)
@@ -71,6 +74,7 @@ def look_up_colours(planes: Planes, road: arrays.Words) -> Plane:
 
 
 def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
+    """Sum the colours of the runs of every label."""
     _require(runs, len(runs), 4)
     _, width = _shape(*planes)
     sums = np.zeros((count, 7), np.int64)
@@ -79,6 +83,7 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 
 
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
+    """Sum the colours of every component's buffer ring (Eq. 10)."""
     _require(runs, len(runs), 4)
     height, columns = _shape(*planes)
     _require(ring, height, -(-columns // 64))
@@ -91,6 +96,7 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
 
 
 def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
+    """Map the colours of each component to a target, rounded and clipped."""
     _require(runs, len(runs), 4)
     count = len(gain)
     _require(gain, count, 3)
@@ -105,6 +111,7 @@ def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Flo
 
 
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
+    """Label the connected components of a mask (Eq. 9)."""
     room = _room_for_runs(bits, width)
     runs = np.empty((len(room[1]), 4), np.int32)
     count = _loops.components(bits, len(bits), width, connectivity == 8, *room, runs)
@@ -112,6 +119,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 
 def keep_region(bits: Bits, width: int) -> Bits:
+    """Keep the largest 8-connected component of a mask."""
     room, region = _room_for_runs(bits, width), np.zeros_like(bits)
     votes = np.zeros_like(room[3])
     _loops.keep_region(bits, len(bits), width, *room, votes, region)
@@ -119,6 +127,7 @@ def keep_region(bits: Bits, width: int) -> Bits:
 
 
 def fill_holes(bits: Bits, width: int) -> Bits:
+    """Fill the holes of a mask."""
     room, filled = _room_for_runs(bits, width), bits.copy()
     outside = np.zeros(len(room[3]), np.uint8)
     _loops.fill_holes(bits, len(bits), width, *room, outside, filled)
@@ -138,6 +147,7 @@ def _room_for_runs(bits: Bits, width: int) -> tuple[npt.NDArray[Any], ...]:
 
 
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
+    """Count pixels by mask, class and region."""
     _, words = _shape(masks[:0], classes[:0], regions[:0])
     counts = np.empty((len(masks), len(classes), len(regions)), np.int64)
     sized = masks, len(masks), classes, len(classes), regions, len(regions)
@@ -146,10 +156,12 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
 
 
 def dilate(bits: Bits, reach: arrays.Reach, width: int) -> Bits:
+    """Dilate a mask by an element."""
     return _by_element(_loops.dilate, bits, reach, width)
 
 
 def erode(bits: Bits, reach: arrays.Reach, width: int) -> Bits:
+    """Erode a mask by an element."""
     return _by_element(_loops.erode, bits, reach, width)
 
 
@@ -165,6 +177,7 @@ def _by_element(loop: Callable[..., int], bits: Bits, reach: arrays.Reach, width
 
 
 def geodesics(cost: arrays.Costs, seeds: Plane, rounds: int) -> arrays.Distances:
+    """Compute the length of the cheapest path from the seeds to each pixel."""
     shape = _shape(cost, seeds)
     distance = np.empty(shape, np.int32)
     _loops.geodesics(cost, seeds, *shape, rounds, distance)
@@ -174,6 +187,7 @@ def geodesics(cost: arrays.Costs, seeds: Plane, rounds: int) -> arrays.Distances
 def tree_sum(
     features: Values, feature: arrays.Indices, threshold: Values, leaves: Masks, values: Values
 ) -> Values:
+    """Compute the sum of decision trees for each pixel."""
     count, pixels = features.shape
     trees, nodes = _shape(feature, threshold, leaves)
     _require(values, trees, plain.LEAVES)
@@ -184,6 +198,7 @@ def tree_sum(
 
 
 def filter_rows(rows: Plane, step: int) -> Plane:
+    """Subtract the Paeth predictor from each byte of the rows of a PNG file."""
     height, width = rows.shape
     lines = np.empty((height, 1 + width), np.uint8)
     _loops.filter_rows(rows, height, width, step, lines)
@@ -191,6 +206,7 @@ def filter_rows(rows: Plane, step: int) -> Plane:
 
 
 def label_rows(labels: Plane, bits: int) -> Plane:
+    """Pack labels, the leftmost into a byte's highest bits."""
     if bits not in plain.LABEL_BITS:
         raise ValueError(f"labels of {bits} bits")
     height, width = labels.shape

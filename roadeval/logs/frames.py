@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from heapq import heappushpop
-from itertools import islice
+from itertools import chain, islice
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -371,7 +371,7 @@ class Accounting:
             yield (
                 f"the images' sizes vary: {len(self.odd_sizes)} of the {self.read} are not of the "
                 f"first one's size but {' or '.join(sizes)} (frames {_few(self.odd_sizes)}); "
-                "labels are held against their own images, and the recording shows all images in "
+                "labels are compared with their own images, and the recording shows all images in "
                 "the first one's size"
             )
 
@@ -498,7 +498,8 @@ class FrameStream:
         With ``labelled`` the frames without truth are left out; not even their chunks are read.
         """
         images, truth = selection.camera.images, selection.truth
-        self._selection = selection
+        self.selection: Final = selection
+        self._is_sparse = labelled
         self.numbers: Final = numbers
         """The numbers of the frames, in order."""
         self.accounting = Accounting(in_log=len(images), in_range=in_range)
@@ -523,6 +524,8 @@ class FrameStream:
         self._iterator = map(self._frame, read)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
+        if not self._is_sparse:
+            self.selection.camera.images.expect(chain.from_iterable(self.parts()))
         return self
 
     def __next__(self) -> LoggedFrame:
@@ -531,10 +534,17 @@ class FrameStream:
     def __len__(self) -> int:
         return len(self.numbers)
 
+    def parts(self) -> Iterator[Sequence[tuple[int, int]]]:
+        """Yield the bytes of the log that hold each frame and its labels, by their log times."""
+        in_log = (source for source in self.selection.labels.values() if not source.digest)
+        topics = [self.selection.camera.images, *(source.pictures for source in in_log)]
+        readers = [t for t in topics if isinstance(t, TopicReader) and len(t)]
+        yield from zip(*(reader.parts(self.log_times) for reader in readers), strict=True)
+
     @property
     def log_times(self) -> npt.NDArray[np.int64]:
         """The log times of all frames of the stream, ``(n,)`` nanoseconds."""
-        return self._selection.camera.images.log_times[np.asarray(self.numbers, np.intp)]
+        return self.selection.camera.images.log_times[np.asarray(self.numbers, np.intp)]
 
     def unpaired(self) -> Iterator[str]:
         """Yield a sentence on labels without a frame, and on frames that lost their label.
@@ -550,7 +560,7 @@ class FrameStream:
             if count:
                 yield Sentence(
                     "{}{} of the {} labels of {} belong to no frame: the first is {} ms from the "
-                    "nearest, and {} may lie between ({topics.sync_tolerance_ms})",
+                    "nearest, and at most {} are allowed ({topics.sync_tolerance_ms})",
                     shown,
                     count,
                     len(source.pictures),
@@ -580,7 +590,7 @@ class FrameStream:
         picture = read_or_error(self._pictures, number)
         if name := getattr(picture, "frame_id", ""):
             self.accounting.frame_ids[name] += 1
-        images, clock = self._selection.camera.images, self._selection.camera.clock
+        images, clock = self.selection.camera.images, self.selection.camera.clock
         log_time = int(images.log_times[number])
         stamp = images.stamp(number) if clock is Clock.STAMP else UNREADABLE
         stamp = log_time if stamp == UNREADABLE else stamp
@@ -591,8 +601,8 @@ class FrameStream:
         if (label := labels.get(TRUTH)) and not isinstance(label.picture, FrameError):
             before = self._contents.setdefault(hash(bytes(label.picture.data)), stamp)
             self.accounting.labels_repeated += before != stamp
-        calibration = self._selection.lens_at(log_time) if self._selection.names else None
-        logged = number, stamp, log_time, picture, labels, self._selection, self.accounting
+        calibration = self.selection.lens_at(log_time) if self.selection.names else None
+        logged = number, stamp, log_time, picture, labels, self.selection, self.accounting
         return LoggedFrame(*logged, calibration)
 
 
@@ -645,7 +655,11 @@ def merge_streams(streams: Sequence[FrameStream]) -> Iterator[tuple[int, LoggedF
     """Yield the frames of several streams by log time, each with the number of its stream."""
     times = np.concatenate([stream.log_times for stream in streams])
     numbers = np.repeat(np.arange(len(streams)), [*map(len, streams)])
-    for number in numbers[np.argsort(times, kind="stable")].tolist():
+    order = numbers[np.argsort(times, kind="stable")].tolist()
+    parts = [stream.parts() for stream in streams]
+    images = streams[0].selection.camera.images
+    images.expect(part for number in order for part in next(parts[number]))
+    for number in order:
         yield number, next(streams[number])
 
 

@@ -55,10 +55,15 @@ from roadeval.runtime.text import visible
 
 @dataclass(slots=True)
 class Traffic:
-    """The requests to a server so far, and the bytes of files in its answers."""
+    """The requests to a server so far, and the bytes of a file in its answers."""
 
     requests: int = 0
     bytes: int = 0
+    total: int = 0
+    """The size of the file."""
+
+    def __str__(self) -> str:
+        return f"{self.bytes / 1e6:.1f} of {self.total / 1e6:.1f} MB in {self.requests:,} requests"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +87,18 @@ def open_log(
 ) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
-    By default messages of no use for a replay are only counted. With ``by_summary`` only the first
-    messages of a log that lies elsewhere are there, see `outline_of`, unless its summary does not
-    suffice. A `LogError` if it is missing, unreadable, or no MCAP log.
+    By default messages that a replay does not use are only counted. With ``by_summary`` only the
+    first messages of a log that lies elsewhere are read, if its summary suffices, see `outline_of`.
+    A `LogError` if it is missing, unreadable, or no MCAP log.
     """
     config = config or LogConfig()
     if isinstance(path, RemoteLog):
-        opened, source, path = path.file, path.source, path.path
+        traffic, opened, source, path = path.traffic, path.file, path.source, path.path
         if problem := content_problem(path, opened):
             raise LogError(problem, where=path)
         files, damage = [path], list[Damage]()
     else:
-        opened, source, path = None, str(path), Path(path)
+        traffic, opened, source, path = None, None, str(path), Path(path)
         files, damage = files_of(path)
     states: dict[Path, tuple[int, ...]] = {}
     for file in files if opened is None else ():
@@ -129,7 +134,7 @@ def open_log(
         raise LogError(str(error), where=path) from error
     name = path.stem if path.is_file() or opened is not None else path.resolve().name
     facts = path, source, visible(name), config, topics, readers, containers, damage, states
-    return Log(*facts, by_summary=outline is not None)
+    return Log(*facts, by_summary=outline is not None, traffic=traffic)
 
 
 def _state(facts: os.stat_result) -> tuple[int, ...]:
@@ -163,6 +168,8 @@ class Log:
     """Other logs that hold labels; they are closed with this one."""
     by_summary: bool = False
     """Whether of its messages only the first ones are there."""
+    traffic: Traffic | None = None
+    """The requests and bytes that a log elsewhere has cost so far; None for one on a disk."""
 
     @cached_property
     def start_ns(self) -> int:
@@ -199,20 +206,18 @@ class Log:
             if self.size <= SMALL or not container.is_covered:
                 container.verify_data()
         lost = [str(damage) for damage in self.damage if damage.lossy]
-        images = [topic for topic in self.topics if topic.is_image] if lost else []
-        return (*lost, *map(self._describe_rest, images))
+        for topic in (topic for topic in self.topics if lost and topic.is_image):
+            reader = self.readers[topic.name]
+            total, readable = max(reader.expected(), len(reader)), reader.readable()
+            of_total = f" of {total}" if total > readable else ""
+            until = ((topic.last_ns or self.start_ns) - self.start_ns) / NS
+            lost.append(f"{topic.name}: {readable}{of_total} images kept, up to {until:.3f} s")
+        return tuple(lost)
 
     @property
     def size(self) -> int:
         """Bytes of all its files."""
         return sum(len(container.source) for container in self.containers)
-
-    def _describe_rest(self, topic: TopicInfo) -> str:
-        reader = self.readers[topic.name]
-        total = max(reader.expected(), len(reader))
-        of_total = f" of {total}" if total > reader.readable() else ""
-        until = (topic.last_ns or self.start_ns) - self.start_ns
-        return f"{topic.name}: {reader.readable()}{of_total} images kept, up to {until / NS:.3f} s"
 
     @cached_property
     def digest(self) -> str:
@@ -248,7 +253,7 @@ class Log:
         return parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
 
     def select(self) -> Selection:
-        """Choose what to replay: what the settings name, else what the log leaves no doubt about.
+        """Choose what to replay: topics that the settings name, else those without doubt.
 
         Another log that holds masks stays open as long as this one. A `LogError` if a topic is
         missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
@@ -499,9 +504,9 @@ def describe(
     """Describe a log by its summary and indexes, and what a replay would choose of it.
 
     With ``verify``, or if it has at most `SMALL` bytes, it is read completely to find all damage;
-    ``on_bytes`` is that of `Log.verify`. Of a log that lies elsewhere only the summary and the
-    first messages are read without ``verify``, unless they do not suffice. A `LogError` if the log
-    is missing, unreadable, or no MCAP log.
+    ``on_bytes`` is that of `Log.verify`. Without ``verify`` only the summary and the first messages
+    of a log that lies elsewhere are read, if they suffice. A `LogError` if the log is missing,
+    unreadable, or no MCAP log.
     """
     config = config or LogConfig()
     # Labels beside the log, and the images of one of several cameras, are sought all over it.

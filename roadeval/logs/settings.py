@@ -152,8 +152,8 @@ class LabelSettings:
     ignore: Truth values, or names of classes, that are not counted.
     road_colors: Truth colours that mean road, as red, green and blue.
     ignore_colors: Truth colours that are not counted.
-    names: Names of classes by their values, or by their colours as ``"64,32,32"``; labels can be
-        called by them. Default: those of a ``vision_msgs/LabelInfo`` beside the labels' topic.
+    names: Names of classes by their values, or by their colours such as ``"64,32,32"``; labels can
+        be called by them. Default: those of a ``vision_msgs/LabelInfo`` beside the labels' topic.
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()

@@ -83,7 +83,7 @@ def settings_in(metadata: Mapping[str, str]) -> NetSettings:
 
 
 def class_names(folder: Path, content: bytes) -> dict[int, str]:
-    """Return the names of classes by number, without names as ``LABEL_3``."""
+    """Return the names of classes by number, without names such as ``LABEL_3``."""
     with reading(folder / CONFIG, "damaged"):
         config = _table(content)
         named = TypeAdapter(dict[str, int]).validate_python(config.get("label2id") or {})

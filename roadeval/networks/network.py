@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, reduce
@@ -367,8 +367,14 @@ def _samples(settings: NetSettings, file: OnnxFile) -> tuple[Sample, ...]:
             file.check_size(Tensor(name, str(array.dtype), array.shape), limit)
         return arrays
 
+    # A black image, and two with saturated colours in large and in small spots.
+    assert settings.size is not None
+    images, rng = [np.zeros((*settings.size[::-1], 3), np.uint8)], np.random.default_rng(0)
+    for spots in (4, 32):
+        colours = 255 * rng.integers(0, 2, (spots, spots, 3), np.uint8)
+        images.append(cv2.resize(colours, settings.size, interpolation=cv2.INTER_LINEAR))
     # In a thread, so that a signal is heard meanwhile.
-    by_output = [*zip(*map_ordered(run, make_test_images(settings), 1), strict=True)]
+    by_output = [*zip(*map_ordered(run, images, 1), strict=True)]
     for name, arrays in zip(outputs, by_output, strict=True):
         if len({array.shape for array in arrays}) > 1:
             raise file.error(_VARIES.format(name, arrays[1].shape, arrays[0].shape))
@@ -380,16 +386,6 @@ WORKING: Final = 8
 _VARIES: Final = (
     "the shape of its output {!r} depends on the image ({} and {}): export it with a fixed one"
 )
-
-
-def make_test_images(settings: NetSettings) -> Iterator[Rgb]:
-    """Yield a black image, and two with saturated colours in large and in small spots."""
-    assert settings.size is not None
-    yield np.zeros((*settings.size[::-1], 3), np.uint8)
-    rng = np.random.default_rng(0)
-    for spots in (4, 32):
-        colours = 255 * rng.integers(0, 2, (spots, spots, 3), np.uint8)
-        yield cv2.resize(colours, settings.size, interpolation=cv2.INTER_LINEAR)
 
 
 def has_instances(file: OnnxFile) -> bool:

@@ -133,6 +133,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
 
     @per_view
     def bind(settings: Any, _learnt: None, view: View) -> Output:
+        """Call the function, and return its mask as an output."""
         values = {"image": view.image, "moment": view.moment, "settings": settings}
         array = np.asarray(function(**{key: values[key] for key in values if key in arguments}))
         codes = None
@@ -155,6 +156,8 @@ def guard(stage: Stage) -> Stage:
     """Return a stage whose errors are `StageError`, and which raises one for a wrong output."""
 
     def name_errors(problem: str, work: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function that does the same work, and names the stage in errors."""
+
         def run(*arguments: Any) -> Any:
             try:
                 return work(*arguments)
@@ -167,6 +170,7 @@ def guard(stage: Stage) -> Stage:
         return run
 
     def bind(settings: Any, parameters: Any) -> Callable[[View], Output]:
+        """Bind the stage to a function that checks its outputs."""
         run, specs = stage.bind(settings, parameters), stage.specs(settings)
 
         def run_checked(view: View) -> Output:

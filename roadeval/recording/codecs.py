@@ -64,7 +64,7 @@ STEPS: Final = [8] + [12] * 63
 """Steps of the 8x8 frequencies of a map's JPEG; one of the first, for the mean, is one level."""
 
 COLUMNS: Final = 400
-"""Most columns of a reduced image."""
+"""Greatest number of columns of a reduced image."""
 
 _FIFTHS: Final = (np.rint(np.arange(256) / 5) * 5).astype(np.uint8)
 """Every level rounded to a multiple of five: fewer levels take fewer bytes."""

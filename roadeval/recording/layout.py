@@ -76,7 +76,7 @@ ROLE: Final = "/state/frame"
 COUNTS: Final = (*OUTCOMES, "N")
 """The order of the numbers under ``/counts``."""
 MOST_WAITING: Final = 128
-"""Most frames that wait to be written. A killed run loses their images and text."""
+"""Greatest number of frames that wait to be written. A killed run loses their images and text."""
 
 
 class RecordingError(RoadevalError):

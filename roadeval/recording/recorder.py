@@ -204,16 +204,17 @@ Texts = Mapping[str, Mapping[str, str]]
 NO_TEXTS: Final[Texts] = {}
 NO_LINES: Final[Mapping[str, str]] = {}
 UNWRITTEN: Final = 4 << 20
-"""Most bytes that wait for Rerun's own thread to write them; Rerun itself has no limit."""
+"""Greatest number of bytes that wait for Rerun's own thread to write them; Rerun itself has no
+limit."""
 
 LEAST_FREE: Final = 64 << 20
 """Bytes that must stay free on the disk beside the rows that wait. They are checked before each
 chunk but the last: they are meant for it, so that the partial recording ends complete."""
 
 HELD: Final = 256 << 20
-"""Most bytes of images of the worst frames that wait until the end."""
+"""Greatest number of bytes of images of the worst frames that wait until the end."""
 WORTH_SAYING: Final = 100_000_000
-"""Bytes from which on the expected size of a recording is announced."""
+"""Size in bytes from which the expected size of a recording is announced."""
 
 PATIENCE_S: Final = 30.0
 """Seconds to wait for a disk that writes nothing."""
@@ -429,7 +430,7 @@ class Recorder:
     def finish(self, results: Mapping[str, str], *, by_camera: Texts = NO_TEXTS) -> None:
         """Add the results and close the file, which takes its name when the context ends.
 
-        ``results`` are the texts to keep under ``/results`` by name, as ``summary`` (JSON) and
+        ``results`` are the texts to keep under ``/results`` by name, such as ``summary`` (JSON) and
         ``windows`` (CSV); ``by_camera`` has those of each camera of a rig. A `RecordingError` if
         the file is incomplete, as on a full disk.
         """
@@ -563,7 +564,7 @@ class Recorder:
 
 
 def _keep(_stream: object) -> None:
-    """Keep a stream as long as the process lives: whoever frees it waits for its writer."""
+    """Keep a stream as long as the process lives: to free it would wait for its writer."""
     Event().wait()
 
 

@@ -120,7 +120,7 @@ class Recording:
         return () if self.complete else self.frame_numbers[-at.MOST_WAITING :]
 
     def result(self, name: str) -> str | None:
-        """Return the text of a result, as ``summary``; None if the run ended before."""
+        """Return the text of a result, such as ``summary``; None if the run ended before."""
         return self._file.document(f"/results/{name}")
 
     @cached_property
@@ -143,7 +143,7 @@ class Recording:
         return self.table("frames")
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return the rows of a table by its name, as ``oracles``; empty if the run has none."""
+        """Return the rows of a table by its name, such as ``oracles``; empty if it has none."""
         if name in self.layout.tables:
             lines = (line for _, line in self._file.rows(f"/results/{name}", TEXT))
             text = "".join((self.layout.tables[name].rstrip(), "\n", *lines))
@@ -152,7 +152,7 @@ class Recording:
         return read_table(name, text, self.facts.tables or None if self.facts else None)
 
     def scalars(self, path: str) -> pd.Series[float]:
-        """Return the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
+        """Return numbers by frame under an entity path, such as ``/timing/filtered/svm``."""
         import pandas as pd
 
         rows = dict(self._file.rows(path, "Scalars:scalars"))

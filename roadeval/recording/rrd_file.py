@@ -8,10 +8,10 @@ A message holds rows of one entity, and is read by its place alone.
 
 This module is a fence: nothing else knows the bytes of the format. Rerun's public reader,
 `rerun.chunk.RrdReader`, gives the same rows of a sound file (``tests/recording/test_rrd_file``).
-But it ended the process on two of 320 files of which a few random bytes were changed, and stopped
-at the damage in nearly all others; here every sound frame is read, and the rest is one line
-(``tests/recording/test_damage``). To read a table takes half the CPU time here, 0.27 s for 0.55 s,
-because Rerun is not imported.
+But it ended the process on two of 320 files with a few bytes changed at random, and stopped at the
+damage in nearly all others; here every sound frame is read, and the rest is one line
+(``tests/recording/test_damage``). To read a table takes half the CPU time here, 0.27 s instead of
+0.55 s, because Rerun is not imported.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _RECORDING: Final = 1
 """The kind of a store that is a recording, not a blueprint."""
 _LZ4: Final = 2
 _MOST_PACKED: Final = 255
-"""Most bytes that LZ4 can make of one: a damaged message may claim any size."""
+"""Greatest number of bytes that LZ4 can make of one: a damaged message may claim any size."""
 
 
 class FrameSpan(NamedTuple):

@@ -65,9 +65,18 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
     """
     width, height = SIZE
     options = ["--headless", "--window-size", f"{width}x{height}"]
+    driver: dict[str, str] = {}
+    if "VK_ICD_FILENAMES" not in os.environ and os.name == "posix":
+        # The software driver draws the same everywhere.
+        if not (drivers := sorted(DRIVERS.glob("lvp_icd*.json"))):
+            raise RecordingError(
+                "no graphics driver that draws without a screen; on Debian or Ubuntu: "
+                f"apt-get install {PACKAGE}"
+            )
+        driver["VK_ICD_FILENAMES"] = str(drivers[0])
     # The viewer reads a user's own settings from these folders; a screenshot has none.
     with tempfile.TemporaryDirectory() as home:
-        environment = {**_driver(), "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
+        environment = {**driver, "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
         with open_viewer(recording, options, **environment) as (_, client):
             shown = go_to(client, frame)
             time.sleep(_SETTLING_S)
@@ -131,7 +140,7 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
 def ask(request: Callable[[], Answer]) -> Answer:
     """Return the viewer's answer to a request, which is repeated after a timeout.
 
-    Rerun's own timeout is 15 seconds, in which a busy machine may not have drawn once. A
+    Rerun's own timeout is 15 seconds; by then a busy machine may not have drawn once. A
     `RecordingError` if it does not answer in time, or has ended.
     """
     deadline = time.monotonic() + LOADING_S
@@ -160,16 +169,3 @@ def go_to(client: ViewerClient, frame: int | None) -> int | None:
         if frame in (None, reached) or time.monotonic() > deadline:
             return reached
         time.sleep(_POLL_S)
-
-
-def _driver() -> dict[str, str]:
-    """Return the variables that choose the software driver: it draws the same everywhere."""
-    if "VK_ICD_FILENAMES" in os.environ or os.name != "posix":
-        return {}
-    drivers = sorted(DRIVERS.glob("lvp_icd*.json"))
-    if not drivers:
-        raise RecordingError(
-            "no graphics driver that draws without a screen; on Debian or Ubuntu: "
-            f"apt-get install {PACKAGE}"
-        )
-    return {"VK_ICD_FILENAMES": str(drivers[0])}

@@ -48,11 +48,11 @@ _TOP, _ROW, _BOTTOM = 64, 44, 50
 _PICTURE, _HEADER = 100, 50
 """Shares of a row's width: each picture, and at least its header."""
 _ROWS: Final = 2
-"""Most variants that have a row: with more every picture would be too small."""
+"""Greatest number of variants that have a row: with more every picture would be too small."""
 _ABREAST: Final = 3
 """Cameras side by side."""
 _OUTCOMES: Final = 4
-"""Most variants with a picture of errors at the top."""
+"""Greatest number of variants with a picture of errors at the top."""
 
 Cell = tuple[LayerSpec, ...]
 """Layers that share a picture."""
@@ -62,17 +62,27 @@ def arrange(layouts: Mapping[str, Layout]) -> rrb.Blueprint:
     """Return the arrangement of a recording's views.
 
     ``layouts`` are the cameras' layouts by the prefix of their entities' paths; the prefix is empty
-    for a drive with one camera.
+    for a drive with one camera. The first tab of a rig shows every camera with its first variant's
+    errors, and curves.
     """
     if "" in layouts:
         tabs = _tabs(layouts[""])
     else:
-        tabs = [_all_cameras(layouts)]
-        names = short_names([*layouts])
+        names, pictures, paths, tabs = short_names([*layouts]), [], [], []
         for prefix, layout in layouts.items():
+            view = outcome(layout, layout.shown[0])
+            view.name = f"{names[prefix]}: {view.name}"
+            _add_prefix(prefix, [view])
+            pictures.append(view)
+            variants = layout.shown[:_ROWS] if layout.has_truth else ()
+            paths += [f"{prefix}{at.PERCENT}/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
             parts = _tabs(layout)
             _add_prefix(prefix, parts, layout.clouds)
             tabs.append(rrb.Tabs(*parts, active_tab=0, name=names[prefix]))
+        curves = [plot(f"{TESTED} by camera, %", paths)] if paths else []
+        below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
+        grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
+        tabs.insert(0, rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras"))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
@@ -106,30 +116,31 @@ def _add_prefix(prefix: str, parts: Sequence[BlueprintPart], beside: Sequence[st
         }
 
 
-def _all_cameras(layouts: Mapping[str, Layout]) -> BlueprintPart:
-    """Return the first tab of a rig: each camera with its first variant's errors, and curves."""
-    names, pictures, paths = short_names([*layouts]), [], []
-    for prefix, layout in layouts.items():
-        view = outcome(layout, layout.shown[0])
-        view.name = f"{names[prefix]}: {view.name}"
-        _add_prefix(prefix, [view])
-        pictures.append(view)
-        variants = layout.shown[:_ROWS] if layout.has_truth else ()
-        paths += [f"{prefix}{at.PERCENT}/{v.name}/{v.stages[-1]}/{TESTED}" for v in variants]
-    curves = [plot(f"{TESTED} by camera, %", paths)] if paths else []
-    below = rrb.Horizontal(*curves, document(at.GUIDE, "What you see"))
-    grid = rrb.Grid(*pictures, grid_columns=min(len(pictures), _ABREAST))
-    return rrb.Vertical(grid, below, row_shares=[3, 1], name="All cameras")
-
-
 def _tabs(layout: Layout) -> list[BlueprintPart]:
     """Return the views of a camera, a tab each."""
     tabs = [overview(layout)]
     if layout.ground:
         tabs.append(_on_the_ground(layout, layout.ground))
-    tabs += [_every_layer(layout, variant) for variant in layout.variants]
+    for variant in layout.variants:
+        views = [camera(), *(layers(spec.title, variant.name, (spec,)) for spec in variant.layers)]
+        if layout.has_shadow_truth:
+            views.append(picture("Truth: shadow", at.CAMERA, at.TRUE_SHADOW))
+        if layout.has_truth:
+            views += [truth(), outcome(layout, variant)]
+        tabs.append(rrb.Grid(*views, grid_columns=4, name=f"{variant.name}: every layer"))
+    of_variants = []
+    for variant in layout.shown if layout.disturbed else ():
+        below_of = {
+            n: f"{at.DISTURBED}/{n}" for n, v in layout.disturbed.items() if variant.name in v
+        }
+        views = [
+            picture(f"{name}: errors", below + at.CAMERA, f"{below}/{variant.name}/{ERRORS.name}")
+            for name, below in below_of.items()
+        ]
+        grid = rrb.Grid(outcome(layout, variant), *views, name=variant.name)
+        of_variants += [grid] if views else []
     if layout.disturbed:
-        tabs.append(_disturbed(layout))
+        tabs.append(rrb.Tabs(*of_variants, active_tab=0, name="Disturbed"))
     if layout.has_truth:
         masks = [*layout.scored()]
         rates = [rate for rate in SHORT if rate in layout.rates]
@@ -146,29 +157,6 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
     texts = (document(f"/results/{name}", title) for name, title in results)
     tabs.append(rrb.Horizontal(*texts, name="Results"))
     return tabs
-
-
-def _disturbed(layout: Layout) -> BlueprintPart:
-    """Return a tab for each variant, with its errors on the images of each disturbance."""
-    tabs = []
-    for variant in layout.shown:
-        paths = {n: f"{at.DISTURBED}/{n}" for n, v in layout.disturbed.items() if variant.name in v}
-        views = [
-            picture(f"{name}: errors", below + at.CAMERA, f"{below}/{variant.name}/{ERRORS.name}")
-            for name, below in paths.items()
-        ]
-        grid = rrb.Grid(outcome(layout, variant), *views, name=variant.name)
-        tabs += [grid] if views else []
-    return rrb.Tabs(*tabs, active_tab=0, name="Disturbed")
-
-
-def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
-    views = [camera(), *(layers(spec.title, variant.name, (spec,)) for spec in variant.layers)]
-    if layout.has_shadow_truth:
-        views.append(picture("Truth: shadow", at.CAMERA, at.TRUE_SHADOW))
-    if layout.has_truth:
-        views += [truth(), outcome(layout, variant)]
-    return rrb.Grid(*views, grid_columns=4, name=f"{variant.name}: every layer")
 
 
 def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
@@ -204,38 +192,39 @@ def _on_the_ground(layout: Layout, ground: Ground) -> BlueprintPart:
 
 def overview(layout: Layout) -> BlueprintPart:
     """Return the first tab."""
-    rows = {variant.name: _cells(variant) for variant in layout.shown[:_ROWS]}
+    rows: dict[str, list[Cell]] = {}
+    for variant in layout.shown[:_ROWS]:
+        cells = rows[variant.name] = []
+        for spec in variant.layers:
+            # An overlay joins the one before it, unless it is the mask of a stage.
+            joins = is_overlay(spec) and spec.name not in variant.stages
+            if joins and cells and is_overlay(cells[-1][0]):
+                cells[-1] = (*cells[-1], spec)
+            else:
+                cells.append((spec,))
     columns = max(map(len, rows.values()))
     shortest = min(rows, key=lambda name: len(rows[name]))
     aside = {shortest: _events()} if len(rows[shortest]) + 1 < columns else {}
     pictures = [camera(), *([truth()] if layout.has_truth else [])]
     pictures += [outcome(layout, variant) for variant in layout.shown[:_OUTCOMES]]
+    # Graphs of the final masks' rates, or without truth of the stages' times.
+    graphs = [] if layout.has_truth else [stage_times(v) for v in layout.shown[:_ROWS]]
+    finals = [f"{variant.name}/{variant.stages[-1]}" for variant in layout.variants]
+    finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
+    for rate in (rate for rate in SHORT if layout.has_truth and rate in layout.rates):
+        paths = [f"{at.PERCENT}/{final}/{rate}" for final in finals]
+        graphs.append(plot(f"{rate}, %: {SHORT[rate].in_words}", paths))
+    graphs += [] if aside else [_events()]
     return rrb.Vertical(
         rrb.Horizontal(*pictures, document(at.GUIDE, "What you see")),
         *(
             _row(name, cells, columns, aside.get(name), has_truth=layout.has_truth)
             for name, cells in rows.items()
         ),
-        rrb.Horizontal(*_curves(layout), *([] if aside else [_events()])),
+        rrb.Horizontal(*graphs),
         row_shares=[_TOP, *[_ROW] * len(rows), _BOTTOM],
         name="Overview",
     )
-
-
-def _cells(variant: VariantLayout) -> list[Cell]:
-    """Return the layers, grouped into pictures.
-
-    An overlay joins the overlay before it, as rings join their shadow, unless it is a stage's mask,
-    which begins a picture of its own.
-    """
-    cells: list[Cell] = []
-    for spec in variant.layers:
-        joins = is_overlay(spec) and spec.name not in variant.stages
-        if joins and cells and is_overlay(cells[-1][0]):
-            cells[-1] = (*cells[-1], spec)
-        else:
-            cells.append((spec,))
-    return cells
 
 
 def _row(
@@ -257,19 +246,6 @@ def _row(
         header = rrb.Vertical(header, document(f"{at.FRAME_RATES}/{variant}"), row_shares=[8, 5])
     start, shares = ([aside, header], [space, _HEADER]) if aside else ([header], [_HEADER + space])
     return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[_PICTURE] * len(cells)])
-
-
-def _curves(layout: Layout) -> list[BlueprintPart]:
-    """Return graphs of the final masks' rates, or without truth of the stages' times."""
-    if not layout.has_truth:
-        return [stage_times(variant) for variant in layout.shown[:_ROWS]]
-    finals = [f"{variant.name}/{variant.stages[-1]}" for variant in layout.variants]
-    finals += [f"{BASELINE}/{FINAL_STAGE}"] * layout.baseline
-    curves = []
-    for rate in (rate for rate in SHORT if rate in layout.rates):
-        paths = [f"{at.PERCENT}/{final}/{rate}" for final in finals]
-        curves.append(plot(f"{rate}, %: {SHORT[rate].in_words}", paths))
-    return curves
 
 
 def picture(title: str, *paths: str) -> BlueprintPart:
@@ -394,8 +370,28 @@ def before_the_first_frame(
     """Yield the static data that a recording begins with; ``camera`` is its short name in a rig."""
     for path, codec in codecs.items():
         yield path, _style(codec)
-    if layout.calibration:
-        yield at.CAMERA, list(_lens(layout.calibration))
+    if calibration := layout.calibration:
+        # Lens and place belong to named frames, as in recordings that Rerun makes of MCAP
+        # files: a pinhole of the entity itself would remove its pictures from every flat view.
+        frame, mounting = _frame_of(calibration), calibration.mounting
+        lens: list[Any] = [
+            rr.Pinhole(
+                image_from_camera=np.array(calibration.matrix).reshape(3, 3),
+                resolution=[calibration.width, calibration.height],
+                child_frame=f"{frame}_image_plane",
+                parent_frame=frame,
+            )
+        ]
+        if mounting is not None:
+            lens.append(
+                rr.Transform3D(
+                    translation=mounting.translation,
+                    quaternion=mounting.rotation,
+                    child_frame=frame,
+                    parent_frame=mounting.parent,
+                )
+            )
+        yield at.CAMERA, lens
     if layout.ground:
         yield from _plane(layout, layout.ground)
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
@@ -432,28 +428,6 @@ def _style(codec: Codec) -> list[Any]:
             ]
         case LayerKind.RGB:
             return [rr.EncodedImage.from_fields(draw_order=-10)]
-
-
-def _lens(calibration: Calibration) -> Iterator[Any]:
-    """Yield the camera's pinhole and, if known, its place.
-
-    They belong to named coordinate frames, as in recordings that Rerun makes of MCAP files: a
-    pinhole of the entity itself would remove its pictures from every two-dimensional view.
-    """
-    frame = _frame_of(calibration)
-    yield rr.Pinhole(
-        image_from_camera=np.array(calibration.matrix).reshape(3, 3),
-        resolution=[calibration.width, calibration.height],
-        child_frame=f"{frame}_image_plane",
-        parent_frame=frame,
-    )
-    if (mounting := calibration.mounting) is not None:
-        yield rr.Transform3D(
-            translation=mounting.translation,
-            quaternion=mounting.rotation,
-            child_frame=frame,
-            parent_frame=mounting.parent,
-        )
 
 
 def _frame_of(calibration: Calibration) -> str:

@@ -38,7 +38,7 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """The block's name in templates, as ``heading``."""
+        """The block's name in templates, such as ``heading``."""
         return type(self).__name__.lower()
 
     def as_json(self) -> dict[str, Any]:
@@ -135,9 +135,9 @@ class Cell(Block):
     bold: bool = False
     """Whether it is the best of its column, or of its row."""
     look: Look | None = None
-    """The look of its variant in charts, whose mark stands before the text."""
+    """The look of its variant in charts; the mark stands before the text."""
     frames: Sequence[int] = ()
-    """The frames whose numbers the text is; on a page they are links to the frames."""
+    """The frames, if the text is a list of their numbers; on a page these are links."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Table(Block):
     small: bool = False
     """Whether it is set in small type."""
     name: str = ""
-    """A name by which the script of a page finds it."""
+    """Name by which the script of a page looks it up."""
     find: str = ""
     """The label of a field on a page that searches words in a table of many rows."""
 
@@ -189,14 +189,12 @@ def blocks_as_markdown(blocks: Iterable[Block]) -> str:
                 lines += [*(f"- {as_markdown(plain(item))}" for item in block.items), ""]
             case Table():
                 lines += [as_markdown(block.caption), ""] if block.caption else []
-                lines += [*_table_lines(block), ""]
+                places = range(len(block.columns))
+                sides = ["---" if p in block.text_columns else "---:" for p in places]
+                rows = [[as_markdown(plain(cell)) for cell in row] for row in block.rows]
+                lines += [f"| {' | '.join(cells)} |" for cells in (block.columns, sides, *rows)]
+                lines.append("")
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _table_lines(table: Table) -> list[str]:
-    sides = ["---" if p in table.text_columns else "---:" for p in range(len(table.columns))]
-    rows = [[as_markdown(plain(cell)) for cell in row] for row in table.rows]
-    return [f"| {' | '.join(cells)} |" for cells in (table.columns, sides, *rows)]
 
 
 def plain(item: Cell | Reason | str) -> str:
@@ -288,7 +286,8 @@ class Picture(Block):
     """A picture of a strip."""
 
     name: str
-    """The same name in every frame, as ``filtered: errors``: another frame shows its picture."""
+    """The same name in every frame, such as ``filtered: errors``: another frame shows its
+    picture."""
     title: str
     """A few words on its content."""
     image: ImageFile

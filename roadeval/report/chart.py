@@ -16,7 +16,7 @@ from typing import Final
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
 
 POINTS: Final = 1500
-"""Most points of a series along the drive: a screen has no room for more."""
+"""Greatest number of points of a series along the drive: a screen has no room for more."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Chart:
     """A chart."""
 
     title: str
-    """The title without the unit, as ``ERR``."""
+    """The title without the unit, such as ``ERR``."""
     kind: ChartKind
     series: Sequence[Series]
     names: Sequence[str] = ()
@@ -148,7 +148,7 @@ class Chart:
     level: Level | None = None
     """A value that lies across the chart."""
     across: str = ""
-    """Quantity of positions that are neither frames nor names, as ``recall``; in `unit`."""
+    """Quantity of positions that are neither frames nor names, such as ``recall``; in `unit`."""
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     """Ends of the axes; by default the ends of the numbers."""
@@ -190,16 +190,8 @@ def thin(series: Series, most: int = POINTS) -> Series:
     size = -(-len(series.x) // most)
     if size <= 1:
         return series
-    places = range(0, len(series.x), size)
-    return replace(
-        series,
-        x=[series.x[place] for place in places],
-        y=[_mean(series.y[place : place + size]) for place in places],
-        low=(),
-        high=(),
-    )
-
-
-def _mean(values: Sequence[float]) -> float:
-    defined = [value for value in values if math.isfinite(value)]
-    return sum(defined) / len(defined) if defined else math.nan
+    means = []
+    for place in range(0, len(series.x), size):
+        values = [value for value in series.y[place : place + size] if math.isfinite(value)]
+        means.append(sum(values) / len(values) if values else math.nan)
+    return replace(series, x=[*series.x[::size]], y=means, low=(), high=())

@@ -26,11 +26,11 @@ _ALIVE: Final = re.compile(
     r"\S*(?:\\(?:[^_*\[\]<>]|<[a-z!/?])|[…!]|%\w|:(?!\d\d\b)\S|//|www\.|[a-z]-\d|\b[\da-f]{7})\S*",
     re.IGNORECASE,
 )
-"""A word of Markdown of which a site may make a link, a mention or a command."""
+"""A word of Markdown that a site may turn into a link, a mention or a command."""
 
 
 def fit(blocks: Iterable[Block], most: int = PART) -> str:
-    """Return the first lines of blocks, in which no name pings anybody or links anywhere."""
+    """Return the first lines of blocks; no name in them notifies anybody or becomes a link."""
     lines, shown = blocks_as_markdown(blocks).split("\n"), list[str]()
     for line in lines:
         short = elide(re.sub(r"\S{99,}", lambda word: elide(word[0], 60), line), 1500)

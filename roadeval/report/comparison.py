@@ -30,7 +30,7 @@ Row = MaskChange | MovedFrame | compare.RegionChange | compare.DriveChange | com
 Columns = dict[str, Callable[[Any], Cell | str]]
 """The function that makes a row's cell in each column, by the columns' titles."""
 NAMED: Final = 20
-"""Most drives in the table of a mask's changed drives."""
+"""Greatest number of drives in the table of a mask's changed drives."""
 CHANGE: Final = ("base %", "new %", "change", "interval")
 """The titles of a change's columns."""
 _COMMAND: Final = "in the viewer"
@@ -52,16 +52,28 @@ def document(
     the result's label; None: no commands.
     """
     labels = [result.label for result in comparison.results]
+    sizes = [
+        f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
+        if result.drive is None
+        else f"{result.label}: {result.frames} frames of {result.drive}"
+        for result in comparison.results
+    ]
+    figures: list[Block] = []
+    if finals := [row for row in _changed(comparison) if row.final]:
+        figures.append(blocks.Figure(charts.changes(finals), caption("change of rates")))
+    if over_drive:
+        figures.append(Heading("Over the drive", 2))
+        figures.append(blocks.Figure(over_drive, caption("common frames", rate=TESTED)))
     return blocks.Report(
         kicker="roadeval comparison",
         title=listing(labels),
-        subtitle="; ".join(map(_subtitle, comparison.results)),
+        subtitle="; ".join(sizes),
         footer=f"comparison of {listing(labels)}",
         blocks=[
             Heading("What changed"),
             *overview(comparison, judgements),
             *_warnings(comparison),
-            *_figures(comparison, over_drive),
+            *figures,
             *_details(comparison, inspect),
         ],
         keywords=["road recognition", "comparison"],
@@ -92,16 +104,6 @@ def comment(
         chief = replace(chief, **{kind: rows})
     first = [Heading(f"roadeval: {head}; ERR of {text}"), *overview(chief, judgements, 10)]
     texts = [*map(fit, (first, changed_drives(chief, 10), _warnings(comparison)))]
-    texts += [*_pictures(chief, mask, over), f"Again: {in_code(command)}\n"]
-    rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
-    for title, part in rest.items():
-        inside = fit(part, MOST - len("\n".join(texts).encode()) - 200)
-        texts.append(f"<details><summary>{title}</summary>\n\n{inside}\n</details>\n")
-    return "\n".join(text for text in texts if text.strip())
-
-
-def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> list[str]:
-    """Return charts of a mask's ERR, each below a sentence on what it shows."""
     base, name = chief.results[0].label, mask.variant
     lines = {line.name: line.y for chart in over for line in chart.series}
     old = lines.get(base if name == mask.result else f"{base}: {name}", [])
@@ -109,20 +111,19 @@ def _pictures(chief: Comparison, mask: MaskChange, over: Sequence[Chart]) -> lis
     pairs = pairs or sorted(((100 * d.base, 100 * d.new) for d in chief.drives), reverse=True)
     where = "over the drive" if old else "drive by drive"
     drawn = {f"ERR of {name}, {where}: bars are {base}, the line is {mask.result}.": levels(pairs)}
-    for unit, rows in {
+    for unit, moves in {
         "region": [(row.title, row.difference.mean) for row in chief.regions],
         "drive": [(row.drive, row.difference.mean) for row in chief.drives],
         "frame": [(f"frame {row.frame}", row.change) for row in chief.moved],
     }.items():
-        drawn[f"Change of {name} by {unit}: orange is worse, blue is better."] = changes(rows)
-    return [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
-
-
-def _subtitle(result: compare.ComparedResult) -> str:
-    """Return the frames or drives of a result in words."""
-    if result.drive is not None:
-        return f"{result.label}: {result.frames} frames of {result.drive}"
-    return f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
+        drawn[f"Change of {name} by {unit}: orange is worse, blue is better."] = changes(moves)
+    texts += [f"{fit([Text(sentence)])}\n{chart}" for sentence, chart in drawn.items() if chart]
+    texts.append(f"Again: {in_code(command)}\n")
+    rest = {"Stages": _changes(comparison), "Regions": _details(replace(comparison, drives=()))}
+    for title, part in rest.items():
+        inside = fit(part, MOST - len("\n".join(texts).encode()) - 200)
+        texts.append(f"<details><summary>{title}</summary>\n\n{inside}\n</details>\n")
+    return "\n".join(text for text in texts if text.strip())
 
 
 def _warnings(comparison: Comparison) -> Iterator[Block]:
@@ -191,7 +192,7 @@ def _changes(comparison: Comparison) -> Iterator[Block]:
 
 
 def _changed(comparison: Comparison) -> list[MaskChange]:
-    """Return the changes to show, without the variants of which no stage changed."""
+    """Return the changes to show, without the variants that changed in no stage."""
     names = {(row.result, row.variant) for row in comparison.changes if not row.unchanged}
     return [row for row in comparison.changes if (row.result, row.variant) in names]
 
@@ -214,15 +215,6 @@ def _table(rows: Sequence[Row], columns: Columns, legend: str = "") -> Table:
         caption=legend,
         small=True,
     )
-
-
-def _figures(comparison: Comparison, over_drive: Sequence[Chart]) -> Iterator[Block]:
-    finals = [row for row in _changed(comparison) if row.final]
-    if finals:
-        yield blocks.Figure(charts.changes(finals), caption("change of rates"))
-    if over_drive:
-        yield Heading("Over the drive", 2)
-        yield blocks.Figure(over_drive, caption("common frames", rate=TESTED))
 
 
 def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator[Block]:

@@ -19,9 +19,10 @@ from roadeval.data.words import MINUS
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
-"""Most marks along a line: a line with more points has none."""
+"""Greatest number of marks along a line: a line with more points has none."""
 ROOM: Final = 0.06
-"""Share of an axis behind its last tick: half of a number of three digits on a telephone."""
+"""Share of an axis after its last tick: room for half of a number of three digits on a
+telephone."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -226,25 +227,21 @@ def _shape(series: Series, x: AxisRange, y: AxisRange) -> Shape:
 
 def _rows(chart: Chart, values: AxisRange) -> Iterator[MarkRow]:
     for position, name in enumerate(chart.names):
-        marks = (_mark(chart, series, position, values) for series in chart.series)
+        marks = []
+        for series in chart.series:
+            at = [*series.x].index(position) if position in series.x else None
+            if at is None or not math.isfinite(value := series.y[at]):
+                continue
+            text, interval = f"{series.name}: {value:.2f} {chart.unit}", list[float]()
+            low, high = (ends[at] if ends else math.nan for ends in (series.low, series.high))
+            if math.isfinite(low) and math.isfinite(high):
+                text += f" ({low:.2f} to {high:.2f})"
+                interval = [min(max(values.percent(end), 0.0), 100.0) for end in (low, high)]
+            marks.append(Mark(series.name, series.look, values.percent(value), text, *interval))
         has_share = chart.share and math.isfinite(chart.share[position])
         share = values.percent(chart.share[position]) if has_share else None
         is_sum = position == len(chart.names) - chart.sums
-        yield MarkRow(name, [mark for mark in marks if mark], share, sums=is_sum)
-
-
-def _mark(chart: Chart, series: Series, position: int, values: AxisRange) -> Mark | None:
-    """Return the mark of a series in a row; None without a defined value."""
-    at = [*series.x].index(position) if position in series.x else None
-    if at is None or not math.isfinite(value := series.y[at]):
-        return None
-    middle, text = values.percent(value), f"{series.name}: {value:.2f} {chart.unit}"
-    low, high = (ends[at] if ends else math.nan for ends in (series.low, series.high))
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return Mark(series.name, series.look, middle, text)
-    text += f" ({low:.2f} to {high:.2f})"
-    left, right = (min(max(values.percent(end), 0.0), 100.0) for end in (low, high))
-    return Mark(series.name, series.look, middle, text, left, right)
+        yield MarkRow(name, marks, share, sums=is_sum)
 
 
 def values(chart: Chart, placed: PlacedChart) -> dict[str, Any]:

@@ -46,7 +46,7 @@ FOOT: Final = 0.45
 GAP_OF_AXES: Final = 0.15
 """Inches at the edges of a figure, left of its axes, below them, and between two of them."""
 NARROW: Final = 5
-"""Inches from which on a figure has room for letters of full size everywhere."""
+"""Width in inches from which a figure has room for letters of full size."""
 HANDLE: Final = 2.6
 """Length of a line in a legend, in its letters' size."""
 LETTERS: Final = 9
@@ -116,16 +116,16 @@ def write_figures(
                 yield f"{figure}{ending}", as_svg(over_drive(figure, name, windows, width))
 
     def write(named_svg: tuple[str, bytes]) -> list[Path]:
-        name, svg = named_svg
-        return [write_file(folder / f"{name}.{kind}", _content(svg, kind)) for kind in kinds]
+        (name, svg), paths = named_svg, []
+        for kind in kinds:
+            dpi = DPI if kind == "png" else None
+            content = svg if kind == "svg" else typeset_figure(svg, kind, dpi)
+            paths.append(write_file(folder / f"{name}.{kind}", content))
+        return paths
 
     # Typst makes both files from one SVG in a few hundredths of a second, while the next figure is
     # drawn. Matplotlib would draw a figure once for each file, which takes ten times as long.
     return [path for paths in map_ordered(write, draw(), 1) for path in paths]
-
-
-def _content(svg: bytes, kind: FileKind) -> bytes:
-    return svg if kind == "svg" else typeset_figure(svg, kind, DPI if kind == "png" else None)
 
 
 def as_svg(figure: Figure) -> bytes:
@@ -136,7 +136,8 @@ def as_svg(figure: Figure) -> bytes:
 
 
 MARKED: Final = 25
-"""Most markers along a line; a line with more points has markers at regular distances."""
+"""Greatest number of markers along a line; a line with more points has markers at regular
+distances."""
 CROWDED: Final = 150
 """More windows than this are drawn as means of neighbours."""
 _LABELS: Final = {
@@ -280,7 +281,16 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame], width: float = WIDT
     column_width = (width - LEFT) / len(rows[0])
     row_height = (column_width - GAP) * pixels_down / pixels_across + GAP
     title, below = f"Road masks on {drive}" if drive else "", NAMES + row_height * len(rows) + GAP
-    figure = _titled(title, _legend(examples), width, LEFT, below)
+    truths = [example.truth for example in examples if example.truth is not None]
+    ignored = any((truth == IGNORE).any() for truth in truths)
+    variants = {variant for example in examples for variant in example.masks}
+    missing = any(variants - example.masks.keys() for example in examples)
+    legend = (
+        "Green: road"
+        + "; grey: ignored, counted nowhere" * ignored
+        + "; faded: there is no mask of this frame" * missing
+    )
+    figure = _titled(title, legend, width, LEFT, below)
     figure_height = figure.get_figheight()
     top_of_rows = figure_height - below + NAMES
     size = LETTERS if width >= NARROW else 7
@@ -306,18 +316,6 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame], width: float = WIDT
                 above = {"size": size, "color": INK, "ha": "center", "va": "bottom"}
                 write((left + right) / 2, top_of_rows - GAP, name, **above)
     return figure
-
-
-def _legend(examples: Sequence[ExampleFrame]) -> str:
-    truths = [example.truth for example in examples if example.truth is not None]
-    ignored = any((truth == IGNORE).any() for truth in truths)
-    variants = {variant for example in examples for variant in example.masks}
-    missing = any(variants - example.masks.keys() for example in examples)
-    return (
-        "Green: road"
-        + "; grey: ignored, counted nowhere" * ignored
-        + "; faded: there is no mask of this frame" * missing
-    )
 
 
 class FigurePicture(FigureImage):

@@ -32,7 +32,7 @@ FPS: Final = 10
 NO_MASK: Final = 128
 """The shade of ignored pixels, and of a mask that a frame does not have."""
 _WIDTHS: Final = {4: 480, 9: 400, math.inf: 320}
-"""Most pixels across a panel, for at most so many panels."""
+"""Greatest width of a panel in pixels, by the number of panels."""
 _KEYFRAMES: Final = 10
 """Frames from one keyframe to the next: a seek decodes at most so many."""
 _CODECS: Final = {"webm": "libvpx-vp9", "mp4": "libx264", "gif": "gif"}

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 WINDOWS: Final = 30
-"""Most points of the figures over the drive."""
+"""Greatest number of points of the figures over the drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class NotableFrame:
     notes: Sequence[str] = ()
     """Sentences about it."""
     conditions: Sequence[str] = ()
-    """Conditions in words, as ``much shadow``."""
+    """Conditions in words, such as ``much shadow``."""
     images: Sequence[LayerImage] = ()
     """The camera, the truth and the errors; empty without the recording."""
     layers: Sequence[Sequence[LayerImage]] = ()

@@ -26,7 +26,7 @@ BARS: Final = "▁▂▃▄▅▆▇█"
 SPARKS: Final = 30
 """Letters of a rate over the runs in a table."""
 ROWS: Final = 10
-"""Most drives of an event, and most parts of the pixels with a chart."""
+"""Greatest number of drives of an event, and of parts of the pixels with a chart."""
 Rows = list[list[Cell | str]]
 
 
@@ -35,6 +35,10 @@ def document(history: History) -> blocks.Report:
     runs = history.runs
     drives = counted(runs[-1].drives, "drive")
     lost = [BulletList("Left out", history.lost, "warning")] if history.lost else []
+    columns, rows = ["run", "labels", "drives", "frames", "result"], list[Sequence[Cell | str]]()
+    for run in reversed(runs):
+        labels = ", ".join(f"{name}={value}" for name, value in run.origin.labels.items())
+        rows.append([run.name, labels, number(run.drives), number(run.frames), run.paths[0]])
     return blocks.Report(
         kicker="roadeval history",
         title=f"{counted(len(runs), 'run')}: {history.focus}",
@@ -53,7 +57,7 @@ def document(history: History) -> blocks.Report:
             rates_table(sorted(history.lines, key=lambda line: line.variant != history.focus)),
             _drives_table(history),
             Heading("The runs"),
-            _runs_table(history),
+            Table(columns, rows, text_columns=(0, 1, 4), small=True, find="Find runs:"),
         ],
         keywords=["road recognition", "history"],
     )
@@ -79,7 +83,7 @@ def rates_table(lines: Sequence[Line]) -> Table:
 def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
     """Return the first and the last rate, and bars for the runs, from the least to the greatest.
 
-    Runs that share a bar are its mean; a run without a level is a space.
+    If several runs share a bar, it shows their mean; a run without a level is a space.
     """
     defined = rates[~np.isnan(rates)]
     if not len(defined):
@@ -87,7 +91,7 @@ def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
     parts = [part[~np.isnan(part)] for part in np.array_split(levels, min(SPARKS, len(levels)))]
     means = np.array([part.mean() if len(part) else np.nan for part in parts])
     low, high = np.nanmin(means), np.nanmax(means)
-    # Bars of a rate that stays are low, whatever the rounding.
+    # If a rate does not change, its bars are low, independent of rounding.
     places = np.nan_to_num((means - low) / max(high - low, 1e-4) * (len(BARS) - 1)).round()
     bars = [" " if np.isnan(m) else BARS[int(p)] for m, p in zip(means, places, strict=True)]
     return percent(float(defined[0])), percent(float(defined[-1])), "".join(bars)
@@ -162,12 +166,3 @@ def _drives_table(history: History) -> Details:
     columns = ["drive", "first %", "last %", "over the runs"]
     table = Table(columns, rows, text_columns=(0, 3), small=True, find="Find drives:")
     return Details(f"{TESTED} of {history.focus} on each drive", [table], on_paper=False)
-
-
-def _runs_table(history: History) -> Table:
-    rows: Rows = []
-    for run in reversed(history.runs):
-        labels = ", ".join(f"{name}={value}" for name, value in run.origin.labels.items())
-        rows.append([run.name, labels, number(run.drives), number(run.frames), run.paths[0]])
-    columns = ["run", "labels", "drives", "frames", "result"]
-    return Table(columns, rows, text_columns=(0, 1, 4), small=True, find="Find runs:")

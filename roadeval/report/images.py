@@ -16,9 +16,9 @@ from roadeval.report.blocks import ImageFile, ImageGrid
 
 ROAD: Final = mask_spec("road", "road")
 EXAMPLE_WIDTH: Final = 400
-"""Most pixels across an example's picture."""
+"""Greatest width of an example's picture in pixels."""
 WIDTH: Final = 420
-"""Most pixels across a picture: about 200 an inch at a quarter of the page."""
+"""Greatest width of a picture in pixels: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
 FINEST: Final = 95
 """Quality of a JPEG in a report, and in a figure of its own."""
@@ -115,42 +115,31 @@ def encode_jpeg(image: Rgb, *, finest: bool = False) -> bytes:
 
 def paint(layer: LayerImage) -> Rgb:
     """Return the layer as ``(H, W, 3)`` uint8 RGB."""
+    import cv2
+
     if layer.spec is None or layer.array is None:
         return layer.image
     match layer.spec.kind:
         case LayerKind.RGB:
             return layer.array.astype(np.uint8, copy=False)
         case LayerKind.SCALAR:
-            return _paint_map(layer.spec, layer.array)
-        case LayerKind.MASK | LayerKind.LABELS:
-            return _overlay(layer.image, layer.spec, layer.array)
-
-
-def _paint_map(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
-    """Colour a map of numbers over its range with Viridis, as the recording's viewer does."""
-    import cv2
-
-    low, high = spec.value_range
-    codes = np.clip((values - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
-    bgr = cv2.applyColorMap(codes, cv2.COLORMAP_VIRIDIS)
-    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
-
-
-def _overlay(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
-    """Draw the classes' colours over the darkened image."""
-    import cv2
-
-    colours = np.zeros((256, 4), np.float32)
-    for label_class in spec.classes:
-        colours[label_class.value] = label_class.rgba
-    overlaid: Rgb = np.empty_like(image)
-    # The new colour depends on the label and the old colour: a table of 256 for each label.
-    for label in np.flatnonzero(np.bincount(labels.ravel(), minlength=256)):
-        opacity = colours[label, 3:] / 255
-        mixed = _LEVELS * DARKEN * (1 - opacity) + colours[label, :3] * opacity
-        tinted = cv2.LUT(image, np.rint(mixed).astype(np.uint8)[None])
-        cv2.copyTo(tinted, (labels == label).view(np.uint8), overlaid)
-    return overlaid
+            # Viridis over its range, as in the recording's viewer.
+            low, high = layer.spec.value_range
+            codes = np.clip((layer.array - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
+            bgr = cv2.applyColorMap(codes, cv2.COLORMAP_VIRIDIS)
+            return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+        case LayerKind.MASK | LayerKind.LABELS:  # the classes' colours over the darkened image
+            classes = np.zeros((256, 4), np.float32)
+            for label_class in layer.spec.classes:
+                classes[label_class.value] = label_class.rgba
+            overlaid: Rgb = np.empty_like(layer.image)
+            # The new colour depends on the label and the old colour: a table of 256 for each label.
+            for label in np.flatnonzero(np.bincount(layer.array.ravel(), minlength=256)):
+                opacity = classes[label, 3:] / 255
+                mixed = _LEVELS * DARKEN * (1 - opacity) + classes[label, :3] * opacity
+                tinted = cv2.LUT(layer.image, np.rint(mixed).astype(np.uint8)[None])
+                cv2.copyTo(tinted, (layer.array == label).view(np.uint8), overlaid)
+            return overlaid
 
 
 def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:

@@ -64,7 +64,11 @@ def verdict(comparison: Comparison) -> str:
     base = comparison.results[0].label
     several = len({change.variant for change in finals}) > 1
     changed = [change for change in finals if not change.unchanged] or finals[:1]
-    parts = [_describe(change, base, several=several) for change in changed]
+    parts = []
+    for change in changed:
+        new = _mask_name(change.result, change.variant) if several else change.result
+        error = change.difference[TESTED]
+        parts.append(describe_change(error, new, base, (change.base, change.new)))
     return " ".join([*parts, *unchanged(comparison, [c for c in finals if c not in changed])])
 
 
@@ -77,38 +81,22 @@ def unchanged(comparison: Comparison, masks: Iterable[MaskChange]) -> Iterator[s
         yield f"{listing([*names])}{of}: every frame as in {base}."
 
 
-def _describe(change: MaskChange, base: str, *, several: bool) -> str:
-    new = _mask_name(change.result, change.variant) if several else change.result
-    return describe_change(change.difference[TESTED], new, base, (change.base, change.new))
-
-
 def where(comparison: Comparison) -> list[str]:
     """Return where final masks are surely better or worse: regions, frames and drives."""
     still = {(mask.result, mask.variant) for mask in comparison.finals() if mask.unchanged}
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
-    return [
-        *(_by_region(comparison, *mask) for mask in masks if mask not in still),
-        *_by_class(comparison),
-        *_disagreements(comparison),
-        *changed_drives(comparison),
-    ]
-
-
-def _by_region(comparison: Comparison, result: str, variant: str) -> str:
-    rows = [r for r in comparison.regions if (r.result, r.variant) == (result, variant)]
-    sure = [r for r in rows if is_significant(r.difference)]
-    parts = []
-    for word, sign in (("better", -1), ("worse", 1)):
-        names = [r.title for r in sure if sign * r.difference.mean > 0]
-        if len(names) == len(rows):
-            parts.append(f"{word} everywhere")
-        elif names:
-            parts.append(f"{word} ({'; '.join(names)})")
-    changes = ", ".join(parts) or why_unsure(row.difference for row in rows)
-    return f"{_mask_name(result, variant)} by region: {changes}"
-
-
-def _by_class(comparison: Comparison) -> Iterator[str]:
+    sentences = []
+    for mask in [mask for mask in masks if mask not in still]:
+        regions = [row for row in comparison.regions if (row.result, row.variant) == mask]
+        sure, parts = [row for row in regions if is_significant(row.difference)], []
+        for word, sign in (("better", -1), ("worse", 1)):
+            titles = [row.title for row in sure if sign * row.difference.mean > 0]
+            if len(titles) == len(regions):
+                parts.append(f"{word} everywhere")
+            elif titles:
+                parts.append(f"{word} ({'; '.join(titles)})")
+        changes = ", ".join(parts) or why_unsure(row.difference for row in regions)
+        sentences.append(f"{_mask_name(*mask)} by region: {changes}")
     base = comparison.results[0].label
     for mask, rows in groupby(comparison.classes, lambda row: (row.result, row.variant)):
         parts = [
@@ -116,7 +104,13 @@ def _by_class(comparison: Comparison) -> Iterator[str]:
             for row in rows
             if max(row.new, row.base) >= 0.1
         ]
-        yield f"{_mask_name(*mask)}: the false road is {', '.join(parts)}"
+        sentences.append(f"{_mask_name(*mask)}: the false road is {', '.join(parts)}")
+    for result, frames in groupby(comparison.disagreements, lambda frame: frame.result):
+        first, *rest = frames
+        most = percent(first.base_right + first.new_right, 1)
+        named = [f"{first.frame} ({most} % of the pixels)", *(str(frame.frame) for frame in rest)]
+        sentences.append(f"{result} disagrees most on frames {', '.join(named)}")
+    return [*sentences, *changed_drives(comparison)]
 
 
 def why_unsure(differences: Iterable[Difference]) -> str:
@@ -139,14 +133,6 @@ def why_unsure(differences: Iterable[Difference]) -> str:
 
 def _mask_name(result: str, variant: str) -> str:
     return result if result == variant else f"{variant} of {result}"
-
-
-def _disagreements(comparison: Comparison) -> Iterator[str]:
-    for result, frames in groupby(comparison.disagreements, lambda frame: frame.result):
-        first, *rest = frames
-        most = percent(first.base_right + first.new_right, 1)
-        named = [f"{first.frame} ({most} % of the pixels)", *(str(frame.frame) for frame in rest)]
-        yield f"{result} disagrees most on frames {', '.join(named)}"
 
 
 def changed_drives(comparison: Comparison) -> list[str]:

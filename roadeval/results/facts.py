@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from difflib import get_close_matches
 from functools import cache, cached_property
@@ -43,8 +44,8 @@ FETCHED: Final[dict[Path, str]] = {}
 def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
     """Return the variant that a result is about: the chosen one, else the first that was brought.
 
-    If none was brought, it is the first; None without any. A `RoadevalError` if the chosen one is
-    not there.
+    If the user brought none, it is the first one; None if there is no variant. A `RoadevalError`
+    if the chosen one is not there.
 
     >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
     'mine'
@@ -86,7 +87,7 @@ class DriveFacts:
 
 @dataclass(frozen=True)
 class FrameAccount:
-    """The number of frames of the image topic; None is unknown, as after a run that ended early.
+    """The number of frames of the image topic; None means unknown (the run ended early).
 
     ``skipped`` counts by reason the frames that were not evaluated.
     """
@@ -114,7 +115,7 @@ class TrainingFacts:
 
 @dataclass(frozen=True)
 class UnlabelledFacts:
-    """The frames without truth: which to look at, and how far masks differ; no error rate."""
+    """The frames without truth: which of them to look at, and how far masks differ."""
 
     frames: int
     variant: str
@@ -123,7 +124,7 @@ class UnlabelledFacts:
     look_at: list[int]
     """Numbers of the frames that rank first, one for each scene."""
     differing: dict[str, dict[str, float]]
-    """The mean share of pixels on which two variants differ, by both names."""
+    """The mean share of pixels on which two variants differ, by the names of both."""
 
 
 @dataclass(frozen=True)
@@ -136,11 +137,11 @@ class EstimateFacts:
     labels: int
     """Frames that were drawn at random, and the number of them that are labelled and scored."""
     probability: float
-    """Probability of each frame to be drawn."""
+    """Probability that a frame is drawn."""
     rates: dict[str, dict[str, Estimate]]
     """Rates of final masks by variant and name; empty if there is a problem."""
     apart: dict[str, dict[str, float | None]]
-    """ERR of the frames that were picked by rank and train nothing, by frame and variant; no rate
+    """ERR of the frames that were picked by rank and train no model, by frame and variant; no rate
     counts them."""
     problem: str = ""
     """Reason why there are no rates."""
@@ -175,7 +176,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Origin:
-    """The origin of a result, by which many of them are put in order."""
+    """The origin of a result; many results are sorted by it."""
 
     made_ns: int | None = None
     """End of the run, in Unix nanoseconds."""
@@ -192,10 +193,10 @@ class FactsFile:
 
     FORMAT: ClassVar[Mapping[str, Any]]
     AGAIN: ClassVar[str]
-    """Advice how to make a damaged file again."""
+    """Advice on how to make a damaged file again."""
     RESULTS: ClassVar[tuple[str, ...]]
-    """The parts that are results, which ``digest`` covers. Whoever moves or renames files may
-    change the others."""
+    """The parts that are results, which ``digest`` covers. The others may change when files are
+    moved or renamed."""
     OPTIONAL: ClassVar[tuple[str, ...]] = ()
     """Parts that are left out if they are empty."""
     VALUES: ClassVar[int] = VALUES
@@ -260,13 +261,14 @@ class FactsFile:
             part = next((name for name in wrong if name in content), wrong[0])
             part = "difference" if part == "effects" and part not in content else part
             raise cls._damage(where, f"`{part}` is not what it must be") from error
-        if not is_as_written(content):
-            raise cls._damage(where, "its content is not what was written")
-        return facts
+        with suppress(TypeError, KeyError, ValueError):  # the digest or a number may be damaged
+            if content["digest"] == digest_of(content, content["digest"]["parts"]):
+                return facts
+        raise cls._damage(where, "its content is not what was written")
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a file; a `ResultsError` if there is none, or as in `parse`."""
+        """Read a file; a `ResultsError` if it does not exist, or `parse` raises one."""
         try:
             return cls.parse(read_bounded(path), path)
         except OSError as error:
@@ -310,9 +312,9 @@ class Facts(FactsFile):
     curves: Totals = field(default_factory=dict)
     """Key figures over all thresholds, by variant and stage with a probability of road."""
     thresholds: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """By variant that learns nothing: its ``own`` threshold on the probability of road, the
-    ``threshold`` that is best on the training frames, ``ERR`` of all evaluated pixels at it, and
-    the ``lines`` of its settings that set it."""
+    """The thresholds of variants that learn nothing: the ``own`` one on the probability of road,
+    the ``threshold`` that is best on the training frames, ``ERR`` of all evaluated pixels at that
+    one, and the ``lines`` of settings that set it."""
     effects: list[Effect] = field(default_factory=list)
     """The paired differences of the drive."""
     oracles: dict[str, Totals] = field(default_factory=dict)
@@ -324,8 +326,8 @@ class Facts(FactsFile):
     misfits: list[str] = field(default_factory=list)
     """Sentences on truth or masks that do not fit the images; the verdict begins with them."""
     slices: dict[str, list[Slice]] = field(default_factory=dict)
-    """By variant the conditions under which it errs more; a variant that is not there was not
-    searched, as with too few frames."""
+    """The conditions under which a variant errs more. A variant is missing if it was not searched,
+    for example because it has too few frames."""
     windows: int = 0
     kitti: Totals = field(default_factory=dict)
     """Rates of KITTI's road benchmark by variant and category; empty for other drives."""
@@ -361,7 +363,7 @@ class Facts(FactsFile):
     cameras: dict[str, Facts] = field(default_factory=dict)
     """The facts of each camera of a rig, by its name."""
     origin: Origin | None = None
-    """None in a recording, which says nothing of its time, and in older results."""
+    """None in older results, and in a recording, which does not state its time."""
 
     FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
     AGAIN = "make it again with roadeval replay"
@@ -381,7 +383,7 @@ class Facts(FactsFile):
     def content(self) -> dict[str, Any]:
         """Return the parts of the file, with differences by the variant that is subtracted.
 
-        ``difference`` is filtered minus unfiltered, by stage. The other parts are by variant each
+        ``difference`` is filtered minus unfiltered, by stage. The other parts hold, by variant, the
         final mask minus that of ``unfiltered``, of ``blind``, or of the method that was tuned.
         """
         names = "difference", "against_unfiltered", "against_blind", "against_method"
@@ -529,7 +531,7 @@ def another_format(version: object, *, later: bool, remedy: str = "replay the lo
         made_by = f"{made_by}, a later version" if version else "a later version"
         return f"made by {made_by}: update roadeval"
     made_by = made_by if version else "an earlier version of roadeval"
-    return f"made by {made_by}, whose format is no longer read: {remedy}"
+    return f"made by {made_by} in a format that is no longer read: {remedy}"
 
 
 def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:
@@ -537,15 +539,6 @@ def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any
     covered = [part for part in parts if part in content]
     text = json.dumps({part: content[part] for part in covered}, allow_nan=False, sort_keys=True)
     return {"parts": covered, "sha256": hashlib.sha256(text.encode()).hexdigest()}
-
-
-def is_as_written(content: Mapping[str, Any]) -> bool:
-    """Return whether the content of a JSON file agrees with its ``digest``."""
-    try:
-        stated = content["digest"]
-        return bool(stated == digest_of(content, stated["parts"]))
-    except (TypeError, KeyError, ValueError):  # the digest is damaged, or a number is none
-        return False
 
 
 def json_text(value: Any) -> str:

@@ -326,24 +326,19 @@ def cache(folder: Path, drive: str) -> None:
     key = Key(drive, visible(results.facts.drive.camera))
     frames, regions = (of_drive(results, name, drive) for name in ("frames", "regions"))
     frames = frames.assign(final=is_final(frames))
-    of_focus = only(frames, final=True, variant=results.facts.focus)
+    place, worst = Path(PICTURES, drive), only(frames, final=True, variant=results.facts.focus)
+    stems = [picture.stem for picture in check_inside(folder / place, folder).glob("*.jpg")]
+    numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]
+    worst = worst[~worst.duplicated("frame") & worst["frame"].isin(numbers)]
+    pictures = [(place / f"{number}.jpg").as_posix() for number in worst["frame"]]
     rows = {
         "frames": frames,
         "regions": tables.finals(regions),
         "classes": of_drive(results, "classes", drive),
         "scores": table_of_scores(frames, regions, beyond_masks(results.facts, key)),
-        "worst": _frames_with_pictures(folder, drive, of_focus).assign(rank=0),
+        "worst": worst.assign(picture=pictures, rank=0),
     }
     write_parquet({files[name]: (name, rows[name]) for name in CACHED}, summary)
-
-
-def _frames_with_pictures(folder: Path, drive: str, rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of ``worst``: those of a drive's ``frames`` that have pictures."""
-    place = Path(PICTURES, drive)
-    stems = [path.stem for path in check_inside(folder / place, folder).glob("*.jpg")]
-    numbers = [int(stem) for stem in stems if stem.isascii() and stem.isdigit()]
-    rows = rows[~rows.duplicated("frame") & rows["frame"].isin(numbers)]
-    return rows.assign(picture=[(place / f"{number}.jpg").as_posix() for number in rows["frame"]])
 
 
 class FleetWriter:
@@ -399,8 +394,8 @@ class FleetWriter:
         ):
             finals, within, disturbed = self._write_tables(members, asked or {})
             read = partial(table_of_drives, self.folder)
-            given = finals, members, settings, dict(run), within
-            facts = summarise(*given, disturbances=disturbed, read=read)
+            basis = finals, members, settings, dict(run), within
+            facts = summarise(*basis, disturbances=disturbed, read=read)
             facts = replace(facts, origin=origin)
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / FLEET, facts.text().encode())

@@ -132,6 +132,7 @@ class _Growing:
         return TableFacts(self.rows, self._digest.hexdigest())
 
     def append(self, lines: str) -> None:
+        """Append whole lines of CSV."""
         self.rows += lines.count("\n")
         content = lines.encode()
         self._digest.update(content)

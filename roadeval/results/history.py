@@ -19,7 +19,7 @@ FORMAT: Final = {"name": "roadeval-history", "version": 1}
 DRIVES: Final = 20
 """Drives of a change in the JSON file, those that changed most."""
 NEAR: Final = 2
-"""Most runs between steps of noisy lines that are one event."""
+"""Greatest number of runs between steps of noisy lines that are one event."""
 EXACT: Final = 1e-4
 """Noise below which equal runs give equal numbers."""
 
@@ -52,7 +52,7 @@ class Event:
     """The last scored run before it."""
     changes: list[LineChange]
     reasons: Sequence[str] = ()
-    """Differences from the run before, as ``svm.c 1 to 2``."""
+    """Differences from the run before, such as ``svm.c 1 to 2``."""
     frames: list[tuple[str, int, float]] = field(default_factory=list)
     """Drive, number and change of ERR of the frames that changed most."""
 
@@ -77,21 +77,21 @@ class History:
     @property
     def standing(self) -> list[Event]:
         """The events that made the focus worse and that no later run has undone."""
-        return [event for event in self.events if _stands(event.first, self.focus)]
+        events = []
+        for event in self.events:
+            line, step = event.first.line, event.first.step
+            # Steps tell it: single runs are noisy, and the last one may have no level.
+            since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
+            is_level = (line.title, line.variant) == (TESTED, self.focus) and step.kind != "outlier"
+            if is_level and event.first.difference.mean > 0 and since > step.change / 2:
+                events.append(event)
+        return events
 
     @property
     def last_good(self) -> RunFacts:
         """The newest run that was scored and that no standing event has made worse."""
         before = self.runs[: min((event.run for event in self.standing), default=len(self.runs))]
         return ([run for run in before if run.drives] or before)[-1]
-
-
-def _stands(change: LineChange, focus: str) -> bool:
-    line, step, rise = change.line, change.step, change.difference.mean
-    # Steps tell it: single runs are noisy, and the last one may have no level.
-    since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
-    is_level = line.title == TESTED and line.variant == focus and step.kind != "outlier"
-    return bool(is_level and rise > 0 and since > step.change / 2)
 
 
 def group_changes(changes: Sequence[LineChange], focus: str) -> list[Event]:
@@ -141,8 +141,8 @@ def verdict(history: History) -> str:
         masks = (line for line in history.lines if (line.variant, line.kind) == (focus, ALL))
         there = max((sum(map(defined, line.rates.tolist())) for line in masks), default=0)
         if there < 2:
-            return f"{focus} is in {there} of {count}, which tells no change."
-        return f"No change of {focus} in {counted(there, 'run')} is more than chance may do."
+            return f"{focus} is in {there} of {count}, too few to show a change."
+        return f"No change of {focus} in {counted(there, 'run')} is beyond chance."
     standing = history.standing
     ranked = sorted(standing, key=lambda event: -event.first.difference.mean) or [
         max(of_focus, key=lambda e: e.run)

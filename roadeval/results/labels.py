@@ -45,7 +45,7 @@ def describe_suspects(suspects: pd.DataFrame) -> str:
 
 
 def describe_annotator(name: str, share: float, frames: int) -> str:
-    """Return what the share of pixels on which two people's labels differ means.
+    """Return the meaning of the share of pixels that two people label differently.
 
     >>> print(describe_annotator("b", 0.009, 20).partition(":")[0])
     b and the truth differ on 0.9 % of the pixels of 20 frames

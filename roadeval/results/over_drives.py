@@ -189,7 +189,7 @@ def _warnings_of_copies(
 
 
 def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield on which drives truth or masks do not fit the images, and the first one's sentence."""
+    """Yield a sentence on the drives where truth or masks do not fit the images."""
     rows = [row for row in drives if row["misfits"]]
     if rows:
         named = listing([row["drive"] for row in rows[:WARNINGS]])

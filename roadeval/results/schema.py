@@ -137,7 +137,7 @@ _MEANS: Final = (
 )
 _MEASURE: Final = (
     Column("measure", Kind.NAME, "`left_edge`, `right_edge`, `free_distance`, a rate"),
-    Column("where", Kind.NAME, "place, as `10m`, `ahead`, `0-10m`, `from_above`"),
+    Column("where", Kind.NAME, "place, such as `10m`, `ahead`, `0-10m`, `from_above`"),
 )
 """Measures of a known camera: metres to the left, or ahead, on flat ground."""
 
@@ -165,7 +165,9 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
     ),
     "disturbances": (
         *_IN_FRAME,
-        Column("disturbance", Kind.NAME, "its name, as `fog-2`, `blur-0_5`, `exposure-minus1`"),
+        Column(
+            "disturbance", Kind.NAME, "its name, such as `fog-2`, `blur-0_5`, `exposure-minus1`"
+        ),
         Column("kind", Kind.NAME, "the kind of the disturbance"),
         Column("strength", Kind.NUMBER, "its strength; of `jpeg` the quality"),
         *_MASK,
@@ -250,7 +252,7 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
         _VARIANT,
         *_MEASURE,
         Column("frames", Kind.COUNT, "evaluated frames on which the truth has it; 0 for sums"),
-        Column("missing", Kind.COUNT, "number of these on which the mask has it not"),
+        Column("missing", Kind.COUNT, "number of these on which the mask misses it"),
         Column("value", Kind.NUMBER, "median of mask minus truth, outwards or ahead; or rate"),
         Column("p95", Kind.NUMBER, "95th percentile of the size of the difference"),
         Column("low", Kind.NUMBER, "least value over stances of the camera"),
@@ -268,7 +270,7 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         Column(
             "status",
             Kind.NAME,
-            "scored, damaged (scored but for what is lost), unscored (no truth), failed",
+            "scored, damaged (scored without the lost part), unscored (no truth), failed",
         ),
         Column("exit_code", Kind.COUNT, "exit code of `replay` on this drive alone"),
         Column("reason", Kind.TEXT, "reason why it was not scored"),

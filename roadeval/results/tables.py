@@ -207,7 +207,7 @@ def read_parquet(
 
     With ``columns`` only these, and tags, are read and checked; ``drive`` must be one of them.
     ``runs`` has a number for each file, which a column ``run`` then says of its rows. With ``flag``
-    only rows are returned in which this column is set. A `ResultsError` if a file is missing or
+    only the rows with this column set are returned. A `ResultsError` if a file is missing or
     damaged, or has not the columns that it must have.
     """
     import pandas as pd

@@ -1,7 +1,7 @@
 """The verdict on a result: how wrong its focus is, compared with what, and what to do next.
 
-What happened on these frames or drives is exact and comes first. What it says of others follows in
-one sentence, which never gives an interval of a single drive whose frames count as a few.
+What happened on these frames or drives is exact and comes first. One sentence on other frames
+follows; it never gives an interval of a single drive with few independent frames.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
-"""Independent frames below which those of one drive say little about other frames."""
+"""Number of independent frames; with fewer, one drive says little about other frames."""
 WORDS: Final = 60
 """Words of a verdict; a longer one does not explain the baseline."""
 WEAK: Final = 0.02
@@ -47,8 +47,8 @@ def verdict_on(facts: Facts | FleetFacts) -> str:
     if isinstance(facts, Facts) and not facts.cameras:
         more |= {"thresholds": facts.thresholds}
         more |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
-    told = verdict(facts.totals, facts.effects, **more)
-    return Sentence(" ").join([*facts.misfits, told])
+    sentence = verdict(facts.totals, facts.effects, **more)
+    return Sentence(" ").join([*facts.misfits, sentence])
 
 
 AnyFacts = TypeVar("AnyFacts", bound=Facts | FleetFacts)
@@ -61,9 +61,9 @@ def with_focus(facts: AnyFacts, focus: str, doubts: pd.DataFrame | None = None) 
     """
     output = {**facts.run.get("output", {}), "focus": focus}
     changes: dict[str, Any] = {"run": {**facts.run, "output": output}}
-    known = facts.unlabelled if isinstance(facts, Facts) else None
-    if known and doubts is not None and len(rows := only(doubts, variant=focus)):
-        changes["unlabelled"] = describe_doubts(rows, known.differing)
+    unlabelled = facts.unlabelled if isinstance(facts, Facts) else None
+    if unlabelled and doubts is not None and len(rows := only(doubts, variant=focus)):
+        changes["unlabelled"] = describe_doubts(rows, unlabelled.differing)
     facts = replace(facts, **changes)
     return replace(facts, verdict=verdict_on(facts))
 
@@ -111,18 +111,18 @@ def verdict(
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
-    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
+    stages = final_stages((variant, stage) for variant, masks in totals.items() for stage in masks)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
     focus = focus_of(rates, focus)
     if best is None or focus is None:
         return f"Nothing to compare: {TESTED} is undefined on every frame."
     of_focus = {e.base: e.rates[TESTED] for e in effects if e.final and e.variant == focus}
-    own = rates[focus][TESTED]
+    error = rates[focus][TESTED]
     whole_drive = [*from_labels(estimated, focus)]
     lead = "On these alone: " if whole_drive else ""
     least = percent(rates[best][TESTED], 1)
-    is_other = not defined(own) or (rates[best][TESTED] < own and least != percent(own, 1))
+    is_other = not defined(error) or (rates[best][TESTED] < error and least != percent(error, 1))
     text = " ".join(
         [
             *whole_drive,
@@ -260,16 +260,16 @@ def _next_step(
 ) -> Iterator[str]:
     """Yield what to do next: set the threshold, or try the preset that is best on real roads.
 
-    A threshold is not told if fewer pixels are hardly wrong at it, or if nothing is road above it.
+    A threshold is not named if it hardly lowers the error, or if no pixel is road above it.
     """
-    own, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
+    error, pooled = rates[focus][TESTED], rates[focus].get(f"pooled_{TESTED}")
     best = thresholds.get(focus)
     if best and best["threshold"] < 1 and defined(pooled) and pooled - best[TESTED] >= ROUNDING:
         digits = 1 if pooled - best[TESTED] >= FINE else 2
         lines = best.get("lines") or f"threshold = {best['threshold']:.2g}"
         setting = "`, `".join(lines.splitlines())
         yield f"Set `{setting}`: then {in_percent(best[TESTED]):.{digits}f} % are wrong."
-    elif {*rates} <= {FILTERED, UNFILTERED, BASELINE} and defined(own) and own >= WEAK:
+    elif {*rates} <= {FILTERED, UNFILTERED, BASELINE} and defined(error) and error >= WEAK:
         yield "Next: try --variant robust."
 
 
@@ -336,7 +336,7 @@ def from_labels(estimated: EstimateFacts | None, variant: str) -> Iterator[str]:
     if rate.unseen:
         yield (
             f"{number(rate.unseen)} frames are far more in doubt than any that was drawn: the "
-            "upper end takes them for wrong altogether. More labels, drawn at random, would tell."
+            "upper end counts all their pixels as wrong. More labels, drawn at random, would tell."
         )
     worst = sorted((-(e.get(variant) or 0.0), frame) for frame, e in estimated.apart.items())
     if shown := [f"{frame} ({percent(-error, 1)} %)" for error, frame in worst[:NAMED]]:

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TIMES: Final = 1.5
-"""Least ratio of two error rates that a sentence tells as a ratio."""
+"""Least ratio of two error rates that a sentence states as a ratio."""
 MOST: Final = 4
-"""Most reasons for the errors of a variant."""
+"""Greatest number of reasons for the errors of a variant."""
 
 
 def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[Reason]]:
-    """Return the reasons for the errors of each variant of which something is confirmed.
+    """Return the reasons for the errors of each variant for which some are confirmed.
 
     They name the class of its false road and the class beside its missed road, the condition under
     which it errs most, and the disturbance that harms it most. Nothing is explained if truth or
@@ -43,7 +43,13 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
     """Yield what is confirmed about a variant: of its classes, its conditions, its disturbances."""
     rows = only(classes, variant=variant)
     for kind, sentence in describe_classes(rows, variant).items():
-        yield Reason(sentence, _worst_frames(rows, kind) if isinstance(facts, Facts) else [])
+        frames: list[int] = []
+        if isinstance(facts, Facts):  # those with most false road of a class, or most missed road
+            is_kind = rows["truth"] == ("other" if kind == "false" else "road")
+            wrong = rows["road"] if kind == "false" else rows["pixels"] - rows["road"]
+            most = wrong.where(is_kind, -1).to_numpy().argmax()
+            frames = [*map(int, str(rows["worst"].iloc[most]).split())]
+        yield Reason(sentence, frames)
     # Regions tell already if one part of the image is worse than the rest.
     conditional = (confirmed for confirmed in facts.slices.get(variant, []) if confirmed.conditions)
     for confirmed in islice(conditional, 1):
@@ -53,16 +59,8 @@ def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> 
         yield Reason(describe_disturbances({variant: changes}, variant), [])
 
 
-def _worst_frames(classes: pd.DataFrame, kind: str) -> list[int]:
-    """Return the frames with most false road of a class, or with most missed road."""
-    is_kind = classes["truth"] == ("other" if kind == "false" else "road")
-    wrong = classes["road"] if kind == "false" else classes["pixels"] - classes["road"]
-    most = wrong.where(is_kind, -1).to_numpy().argmax()
-    return [*map(int, str(classes["worst"].iloc[most]).split())]
-
-
 NAMED: Final = 3
-"""Most classes that a sentence names."""
+"""Greatest number of classes that a sentence names."""
 LEAST_WRONG: Final = 0.001
 """Less false road, or missed road, than this share of the pixels makes no sentence."""
 LEAST_SHARE: Final = 0.25

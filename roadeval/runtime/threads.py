@@ -78,6 +78,7 @@ def time_limit(
     most = resident() + grown
 
     def watch() -> None:
+        """End the work when it is late, too large, or stopped."""
         while not done.wait(WATCHED_S):
             if time.monotonic() > until or resident() > most:
                 late.set()

@@ -279,8 +279,7 @@ def from_log(
         kind = "labelled frames" if by_truth else "frames, by the reference patch in them,"
         warnings.append(
             f"the model of other drives ({settings.model}) was adapted to this drive with "
-            f"{len(held.frames)} of its own {kind}: the rates are not those on a drive that it has "
-            "not seen"
+            f"{len(held.frames)} of its own {kind}: on a new drive the rates are others"
         )
     model = fit(held.frames, pipelines, settings, base)
     trained = () if base else (frame.number for frame in held.frames)

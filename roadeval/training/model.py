@@ -138,8 +138,8 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     path
         The file.
     stages
-        Further stages whose parameters it may hold, as ``config.pipelines()["mine"].stages()``.
-        A file loads no stage by itself.
+        Further stages whose parameters it may hold, such as
+        ``config.pipelines()["mine"].stages()``. A file loads no stage by itself.
     """
     header, arrays = read_archive(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:

@@ -17,7 +17,7 @@ def made(request, tmp_path_factory):
 def test_its_version_is_named_and_the_way_out(made, name, command):
     version, folder = made
     run = here(*command.split(), folder / name)
-    told = f"made by roadeval {version}, whose format is no longer read: replay the log again\n"
+    told = f"made by roadeval {version} in a format that is no longer read: replay the log again\n"
     assert (run.returncode, run.stdout) == (1, "")
     assert run.stderr.startswith(f"roadeval: error: {folder / name}")
     assert run.stderr.endswith(told)
@@ -26,6 +26,6 @@ def test_its_version_is_named_and_the_way_out(made, name, command):
 
 def test_the_version_that_wrote_a_model_is_named(made):
     version, folder = made
-    told = f"made by roadeval {version}, whose format is no longer read: train it again"
+    told = f"made by roadeval {version} in a format that is no longer read: train it again"
     with pytest.raises(roadeval.RoadevalError, match=told):
         roadeval.load_model(folder / MODEL)

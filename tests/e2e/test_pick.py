@@ -257,7 +257,7 @@ def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
     [
         (("out.rrd", "-n", 5, "-o", "reports"), "holds something else"),
         (("out.rrd", "-n", 5, "-o", "x", "--by", "nobody"), "no variant nobody; there are"),
-        (("moved", "-n", 5, "-o", "x"), "moved: its recording is not where it was"),
+        (("moved", "-n", 5, "-o", "x"), "moved: its recording was moved"),
         (("whole.mcap", "-n", 5, "-o", "x"), "whole.mcap: every frame has truth"),
         (("nothing.rrd", "-n", 5, "-o", "x"), "nothing.rrd"),
     ],

@@ -571,7 +571,7 @@ EXAMPLE = r"as 'post\.filtered\.ERR > \+0\.5pp'"
         ),
         ("__import__('os').system('true') > 1pp", EXAMPLE),
         ("post.filtered.EER > 1pp", "no rate EER; there are ACC, ERR"),
-        ("post.filtered.ERR > 20% surely", r"a level \(%\) .* has none"),
+        ("post.filtered.ERR > 20% surely", r"a level \(%\) has none"),
         ("post.filtered.pooled_ERR > 1pp surely", "pooled_ERR has no interval"),
         ("post.filtered.IoU < -1pp surely", "has no interval; 'surely' goes with ACC, ERR"),
         ("post.filtered.TPR < -1pp surely", "has no interval; 'surely' goes with ACC, ERR"),

@@ -6,14 +6,14 @@ does, too: ``/bucket/key`` is an object of its bucket.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import time
+import zlib
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, Self
 from urllib.parse import urlsplit
 
@@ -38,9 +38,16 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(body=True)
 
     def _answer(self, *, body: bool) -> None:
+        with self.server.waiting:
+            time.sleep(self.server.latency)
+            self._answer_now(body=body)
+
+    def _answer_now(self, *, body: bool) -> None:
         kind = "whole" if self.server.folder else self.path.strip("/").partition("/")[0]
         self.server.requests.append((self.command, self.path, dict(self.headers)))
-        if kind == "hung":
+        if len(self.server.requests) > self.server.fails_after:
+            self._head(503, 0)
+        elif kind == "hung":
             time.sleep(SLOW)
         elif kind.isdigit():
             self._head(int(kind), 0)
@@ -63,7 +70,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _content(self, kind: str, *, body: bool) -> None:
         name, folder = Path(urlsplit(self.path).path).name, self.server.folder
         content = (folder / name).read_bytes() if folder else CONTENT
-        tag = f'"{hashlib.md5(content).hexdigest()}"'
+        tag = f'"{zlib.crc32(content):x}"'
         if self.headers.get("If-Match", tag) != tag:
             self._head(412, 0)
             return
@@ -101,10 +108,27 @@ class _Handler(BaseHTTPRequestHandler):
         """Stay silent."""
 
 
+class _Count:
+    """The threads within its ``with`` statement, and the most that ever were."""
+
+    def __init__(self) -> None:
+        self.now, self.most, self._lock = 0, 0, Lock()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self.now += 1
+            self.most = max(self.most, self.now)
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self.now -= 1
+
+
 class Server(ThreadingHTTPServer):
     """The server; ``requests`` has the method, path and headers of each request.
 
     With a ``folder`` all its files are served as they should be, whatever stands before their name.
+    It waits ``latency`` seconds before each answer, and gives none after ``fails_after`` of them.
     """
 
     daemon_threads = True
@@ -112,6 +136,7 @@ class Server(ThreadingHTTPServer):
     def __init__(self, folder: Path | None = None) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
         self.folder, self.sent = folder, 0
+        self.latency, self.fails_after, self.waiting = 0.0, 1 << 30, _Count()
         self.requests: list[tuple[str, str, dict[str, str]]] = []
         self._thread = Thread(target=self.serve_forever, args=(0.05,), daemon=True)
 

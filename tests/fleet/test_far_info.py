@@ -79,10 +79,8 @@ def test_a_line_tells_what_was_read_and_what_was_not(server, tmp_path):
     description = roadeval.info(server.url("drive.mcap"))
     out = Console(width=120, file=io.StringIO())
     screen.show(description, out)
-    amount = f"{len(server.requests)} requests, {server.sent / 1e6:.1f} MB"
-    line = (
-        f"read from the log's summary and first messages in {amount}; --verify checks every chunk"
-    )
+    amount = f"{server.sent / 1e6:.1f} of 6.6 MB in {len(server.requests)} requests"
+    line = f"read {amount}: the log's summary and first messages; --verify checks every chunk"
     assert out.file.getvalue().splitlines()[1] == line
 
 

@@ -97,9 +97,9 @@ def test_facts_are_the_paired_change_by_variant_and_disturbance(ran):
 
 
 def test_masks_from_elsewhere_cannot_be_disturbed_which_is_said_once(ran):
-    told = [str(text) for text in ran[1].warnings if "made of the images as they are" in text]
+    told = [str(text) for text in ran[1].warnings if "of the undisturbed images" in text]
     assert told == [
-        "`frames.disturb`: not for net, whose masks were made of the images as they are"
+        "`frames.disturb`: not for net, because their masks were made of the undisturbed images"
     ]
 
 

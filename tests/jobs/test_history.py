@@ -14,6 +14,7 @@ from roadeval.report.blocks import Figure, Heading
 from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict
 from roadeval.results.tables import read_parquet, read_table, write_parquet
+from tests.fleet.serving import Server
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
 DAY = 86_400
@@ -124,7 +125,7 @@ def test_a_result_of_another_format_and_a_damaged_one_are_told(nights, tmp_path)
     assert (event.run, event.before) == (4, 1)
     assert event.reasons[0] == "commit 111111111111 to 555555555555"
     assert len(made.lost) == 3
-    assert "whose format is no longer read" in made.lost[0]
+    assert "in a format that is no longer read" in made.lost[0]
     assert "scores.parquet: damaged" in made.lost[1]
 
 
@@ -221,6 +222,15 @@ def test_a_run_that_cannot_be_read_is_told_where_the_folder_is_the_base(nights, 
     (folder / "2" / "fleet.json").write_text("{")
     warnings = compare([folder, folder / "7"]).comparison.warnings
     assert len([text for text in warnings if str(folder / "2" / "fleet.json") in text]) == 1
+
+
+def test_a_place_without_results_does_not_end_a_history(nights, tmp_path):
+    with Server() as server:
+        made = history([nights, tmp_path, server.url("404/night.zip")])
+    assert len(made.runs) == 8
+    of_folder, of_url = made.lost
+    assert of_folder.startswith(str(tmp_path))
+    assert server.url("404/night.zip") in of_url
 
 
 def test_a_folder_of_runs_is_not_compared_with_itself(nights):

@@ -104,8 +104,8 @@ def test_labelled_frames_alone_give_the_tables_of_the_whole(places, tmp_path, tr
 def test_a_stride_that_misses_every_label_says_so(places, tmp_path):
     done = replay(places, tmp_path, "6", ("net",), frames={"every": 2})
     (said,) = [each for each in done.warnings if "none of the frames that were read" in each]
-    assert "`frames.every` 2 leaves out each one that has" in said
-    assert "`frames.labelled` reads only frames that have" in said
+    assert "`frames.every` 2 leaves out all frames that have it" in said
+    assert "`frames.labelled` reads only frames that have it" in said
     every = replay(places, tmp_path, "6", ("net",), frames={"every": 2, "labelled": True})
     assert every.summary["frames"]["evaluated"] == 3
 

@@ -116,7 +116,7 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
 @pytest.mark.parametrize(
     ("version", "told"),
     [
-        (2, "made by roadeval 0.1.9, whose format is no longer read: replay the log again"),
+        (2, "made by roadeval 0.1.9 in a format that is no longer read: replay the log again"),
         (4, "made by roadeval 0.1.9, a later version: update roadeval"),
     ],
 )

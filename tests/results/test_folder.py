@@ -251,11 +251,11 @@ def test_damaged_settings_are_one_line(given):
     [
         (
             {"format": {**Facts.FORMAT, "version": 1}},
-            "made by an earlier version of roadeval, whose format",
+            "made by an earlier version of roadeval in a format",
         ),
         (
             {"format": {**Facts.FORMAT, "version": 2}, "versions": {"roadeval": "0.2.0"}},
-            "made by roadeval 0.2.0, whose format",
+            "made by roadeval 0.2.0 in a format",
         ),
         ({"format": {**Facts.FORMAT, "version": 99}}, "made by a later version: update roadeval"),
         ({"format": {**Facts.FORMAT, "version": "x"}}, "not of format roadeval-summary"),

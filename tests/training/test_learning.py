@@ -447,16 +447,16 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
     assert "not a model file" in refusal({"header": np.array([Trap()], object)}, tmp_path)
 
 
-READ_NO_MORE = "whose format is no longer read: train it again"
+READ_NO_MORE = "in a format that is no longer read: train it again"
 LATER = "a later version: update roadeval"
 
 
 @pytest.mark.parametrize(
     ("version", "writer", "why"),
     [
-        (2, None, f"made by roadeval 0.1.0, {READ_NO_MORE}"),
-        (6, None, f"made by an earlier version of roadeval, {READ_NO_MORE}"),
-        (None, None, f"made by an earlier version of roadeval, {READ_NO_MORE}"),
+        (2, None, f"made by roadeval 0.1.0 {READ_NO_MORE}"),
+        (6, None, f"made by an earlier version of roadeval {READ_NO_MORE}"),
+        (None, None, f"made by an earlier version of roadeval {READ_NO_MORE}"),
         (99, "9.0", f"made by roadeval 9.0, {LATER}"),
     ],
 )

@@ -1,1 +1,1 @@
-"""The commands: each file here is one, whose function has the file's name."""
+"""The commands: each file here is one command, and its function has the name of the file."""

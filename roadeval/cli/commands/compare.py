@@ -28,7 +28,7 @@ Outputs = Annotated[
     list[Path] | None,
     arguments.option(
         "-o --output",
-        "File whose ending is .pdf, .html, .md, .json, or .svg (a badge). Repeatable.",
+        "File that ends in .pdf, .html, .md, .json, or .svg (a badge). Repeatable.",
         "FILE",
         callback=arguments.ending_in(".pdf", ".html", ".md", ".json", ".svg"),
     ),
@@ -75,7 +75,8 @@ def compare(
     typed = shlex.join(["roadeval", "compare", *map(str, results), *options])
     files = [(path, "") for path in output or ()]
     files += [(path, kind) for path, kind in ((junit, "junit"), (markdown, "comment")) if path]
-    with holding(*(path for path, _ in files), inputs=list_results(results)):
+    places, _ = list_results(results)
+    with holding(*(path for path, _ in files), inputs=places):
         with progress.show(quiet or json) as watch:
             compared = comparing.compare(
                 results, variants=variant, fail_if=fail_if or [], on_progress=watch

@@ -21,14 +21,16 @@ def history(
     ] = None,
     last: Annotated[
         int,
-        option("--last", "Earlier runs with whose mean --fail-if compares the last.", "N", min=1),
+        option(
+            "--last", "Earlier runs; --fail-if compares the last run with their mean.", "N", min=1
+        ),
     ] = 7,
     fail_if: arguments.Conditions = None,
     output: Annotated[
         list[Path] | None,
         option(
             "-o --output",
-            "File of the history, whose ending is .html, .pdf, .md or .json. Repeatable.",
+            "File of the history that ends in .html, .pdf, .md or .json. Repeatable.",
             "FILE",
             callback=arguments.ending_in(".html", ".pdf", ".md", ".json"),
         ),
@@ -41,17 +43,18 @@ def history(
         roadeval history nightly/
         roadeval history nightly/ --last 10 -o history.html
 
-    Runs are in the order in which they were made. Drives are paired, so one that comes or goes
-    changes nothing, and one whose truth changed begins anew. In a year of nightly runs the chance
-    of any false step is at most 5 %. Exit code 4 if a --fail-if condition holds for the last run
-    against the mean of the --last runs before it; 1 if it cannot be judged; 3 if a result cannot be
-    read.
+    Runs are in the order in which they were made. Drives are paired: an added or removed drive
+    changes nothing, and a drive with another truth counts as a new one. In a year of nightly runs
+    the chance of any false step is at most 5 %. Exit code 4 if a --fail-if condition holds for the
+    last run against the mean of the --last runs before it; 1 if it cannot be judged; 3 if a result
+    cannot be read.
     """
     from roadeval.cli.screens import history as screen
     from roadeval.jobs.outputs import holding
     from roadeval.jobs.results import history as job
 
-    with holding(*(output or ()), inputs=job.list_results(results)):
+    places, _ = job.list_results(results)
+    with holding(*(output or ()), inputs=places):
         with progress.show(quiet or json) as watch:
             made = job.history(results, by=by, last=last, fail_if=fail_if or [], on_progress=watch)
         for path in output or []:

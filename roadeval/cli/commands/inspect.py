@@ -24,7 +24,7 @@ Focus = Annotated[
     str | None,
     arguments.option(
         "--variant --focus",
-        "Variant by which frames rank. Default: what you brought, else filtered.",
+        "Variant that ranks the frames. Default: what you brought, else filtered.",
         "NAME",
     ),
 ]
@@ -62,30 +62,24 @@ def inspect(
         raise typer.BadParameter("give --frame or --worst, not both")
     if listed and (frame is not None or screenshot is not None):
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
+    from roadeval.cli.screens import inspect as screen
+    from roadeval.jobs.results import inspect as job
     from roadeval.jobs.results.result import Result
+    from roadeval.results.facts import json_text, plain
 
     opened = arguments.select_camera(Result(recording, focus=focus), camera)
     if opened.fleet and frame is not None:
         raise typer.BadParameter("--frame does not go with a fleet: give its drive's recording")
-    if listed:
-        _list(opened, worst, as_json=json)
-    else:
+    if not listed:
         _show(opened, frame, worst, file=screenshot)
+    else:
+        frames = job.worst_frames(opened, worst or job.LISTED)
+        if json:
+            console.emit(json_text(plain([asdict(frame) for frame in frames])).rstrip())
+        else:
+            screen.show(opened.name, frames, console.results(), of_fleet=opened.fleet is not None)
     messages.warning(*opened.warnings)
     return ExitCode.DONE
-
-
-def _list(opened: Result, count: int | None, *, as_json: bool) -> None:
-    """Print the worst frames, for people or as JSON."""
-    from roadeval.cli.screens import inspect as screen
-    from roadeval.jobs.results import inspect as job
-    from roadeval.results.facts import json_text, plain
-
-    frames = job.worst_frames(opened, count or job.LISTED)
-    if as_json:
-        console.emit(json_text(plain([asdict(frame) for frame in frames])).rstrip())
-    else:
-        screen.show(opened.name, frames, console.results(), of_fleet=opened.fleet is not None)
 
 
 def _show(opened: Result, frame: int | None, rank: int | None, *, file: Path | None) -> None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from shlex import join, quote
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import OptionValues, takes
-
-if TYPE_CHECKING:
-    from roadeval.jobs.results.pick import PickedFrames
 
 
 @takes("preset", "config", "nets", "training.model", "cameras", "run.jobs")
@@ -78,15 +74,11 @@ def pick(
         out = console.results()
         folder = drives[0].folder
         out.print(f"Correct {folder}/proposals, and put the results into {folder}/labels.")
-        console.show_next(out, _next_command(drives, output))
+        logs, run_toml = join(drive.log for drive in drives), quote(str(drives[0].config))
+        command = f"replay {logs} --config {run_toml} --truth {quote(str(folder))}"
+        if len(drives) > 1:
+            truth = quote(f"{output}/{{drive}}")
+            command = f"fleet {logs} --config {run_toml} --truth {truth} -o labelled"
+        console.show_next(out, f"roadeval {command}")
     messages.warn_of_missing_loops()
     return ExitCode.DONE
-
-
-def _next_command(drives: Sequence[PickedFrames], output: Path) -> str:
-    """Return the command that scores the logs with their labels, as they were replayed."""
-    logs, config = join(drive.log for drive in drives), quote(str(drives[0].config))
-    if len(drives) == 1:
-        return f"roadeval replay {logs} --config {config} --truth {quote(str(drives[0].folder))}"
-    truth = quote(f"{output}/{{drive}}")
-    return f"roadeval fleet {logs} --config {config} --truth {truth} -o labelled"

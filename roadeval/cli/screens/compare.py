@@ -24,6 +24,6 @@ def show(comparison: Comparison, judgements: Sequence[Judgement], out: Console) 
 
 
 def show_verdict(comparison: Comparison, out: Console) -> None:
-    """Print the verdict, the last of what a comparison prints but for losses and limits."""
+    """Print the verdict; only losses and limits follow it."""
     out.print()
     out.print(verdict(comparison), style="bold")

@@ -70,7 +70,7 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
 def manifest(facts: FleetFacts) -> Iterator[str]:
     """Yield the lines of a manifest to copy, if drives failed because their labels differ.
 
-    Labels that the command named are those of the drives that did not fail by them.
+    The labels that the command named belong to the drives that did not fail because of them.
     """
     odd = {drive for drive, reason in facts.failed.items() if "`labels." in reason}
     named = {key: value for key, value in facts.run["labels"].items() if value}

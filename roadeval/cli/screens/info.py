@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
-from roadeval.data.words import counted, timestamp
+from roadeval.data.words import timestamp
 from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from roadeval.logs.log import LogDescription
-    from roadeval.logs.topics.reader import TopicInfo
 
 NS = 1_000_000_000
 
@@ -28,12 +26,18 @@ def show(log: LogDescription, out: Console) -> None:
     length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
     console.say(f"{log.path}: {length}, {size}{unverified}", out)
     if read := log.traffic:
-        what = " from the log's summary and first messages" if log.by_summary else ""
-        amount = f"{counted(read.requests, 'request')}, {read.bytes / 1e6:.1f} MB"
+        what = ": the log's summary and first messages" if log.by_summary else ""
         rest = "; --verify checks every chunk" if log.by_summary else ""
-        console.say(f"read{what} in {amount}{rest}", out)
+        console.say(f"read {read}{what}{rest}", out)
     out.print()
-    tables.show_table(_topic_table(log.topics), out)
+    columns, rows = ["topic", "carries", "size", "messages", "rate"], []
+    for topic in log.topics:
+        carries = f"{topic.format or topic.schema or 'no schema'} ({topic.encoding})"
+        rate = f"{topic.rate_hz:.4g} Hz" if topic.rate_hz else ""
+        rate = "< 0.01 Hz" if topic.rate_hz and topic.rate_hz < 0.01 else rate
+        pixels = "x".join(map(str, topic.size or ()))
+        rows.append([topic.name, carries, pixels, str(topic.count), rate])
+    tables.show_table(Table(columns, rows, text_columns=(0, 1)), out)
     for topic in log.topics:
         if topic.problem:
             console.say(f"{topic.name} cannot be read: {with_flags(topic.problem)}", out)
@@ -50,20 +54,3 @@ def show(log: LogDescription, out: Console) -> None:
     out.print("replay would pick")
     for pick in log.picks:
         out.print(console.wrap(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True)
-
-
-def _topic_table(topics: Sequence[TopicInfo]) -> Table:
-    rows = []
-    for topic in topics:
-        rate = f"{topic.rate_hz:.4g} Hz" if topic.rate_hz else ""
-        rows.append(
-            [
-                topic.name,
-                f"{topic.format or topic.schema or 'no schema'} ({topic.encoding})",
-                "x".join(map(str, topic.size or ())),
-                str(topic.count),
-                rate if not topic.rate_hz or topic.rate_hz >= 0.01 else "< 0.01 Hz",
-            ]
-        )
-    columns = ["topic", "carries", "size", "messages", "rate"]
-    return Table(columns, rows, text_columns=(0, 1))

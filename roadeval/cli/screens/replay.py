@@ -34,19 +34,39 @@ if TYPE_CHECKING:
 
 
 def show(outcome: Outcome, out: Console) -> None:
-    """Print what a replay read, each variant's rates, the outputs' places, and what to do next."""
+    """Print what a replay read, each variant's rates, the outputs' paths, and what to type next."""
     facts = outcome.facts
     cameras = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
     out.print(f"{facts.drive.name}: {cameras}{account(facts.frames)}")
+    if outcome.traffic:
+        out.print(f"read {outcome.traffic}")
     out.print()
     if facts.totals:
         tables.show([*_score_tables(facts, outcome.metres)], out)
         out.print()
-    _show_files(outcome, out)
+    if outcome.errors and out.encoding.startswith("utf"):
+        label = f" up to {percent(max(outcome.errors), 1)} % ({facts.focus})"
+        # Where several frames share a bar, it shows the highest error.
+        size = -(-len(outcome.errors) // max(out.width - 11 - len(label), 1))
+        starts = range(0, len(outcome.errors), size)
+        errors = [max(outcome.errors[start : start + size]) for start in starts]
+        bars = (BARS[int(error / (max(errors) or 1) * (len(BARS) - 1))] for error in errors)
+        out.print(f"error      {''.join(bars)}{label}")
+    if outcome.recording:
+        recording = f"{outcome.recording} ({megabytes(outcome.recording)})"
+        out.print(f"recording  {recording}", soft_wrap=True)
+    if outcome.reports:
+        count = len(outcome.files)
+        out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
+    if figures := [str(file) for file in outcome.files if file.suffix == ".png"]:
+        line = f"figures    {' '.join(figures)}"
+        out.print(console.wrap(line, out.width, indent=0, hang=11), soft_wrap=True)
+    if place := outcome.recording or outcome.reports:
+        console.show_next(out, *islice(_next_commands(outcome, place), 3))
 
 
 def show_verdict(facts: Facts, out: Console) -> None:
-    """Print the verdict, the last of what a replay prints but for losses."""
+    """Print the verdict; only losses follow it."""
     if facts.totals:
         tables.show_verdict(facts, out)
         return
@@ -80,50 +100,14 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
     yield from why(facts)
 
 
-def _show_files(outcome: Outcome, out: Console) -> None:
-    """Print the error along the drive, the outputs' paths to copy, and what to type next."""
-    if outcome.errors and out.encoding.startswith("utf"):
-        label = f" up to {percent(max(outcome.errors), 1)} % ({outcome.facts.focus})"
-        out.print(f"error      {_sparkline(outcome.errors, out.width - 11 - len(label))}{label}")
-    if outcome.recording:
-        size = megabytes(outcome.recording)
-        out.print(f"recording  {outcome.recording} ({size})", soft_wrap=True)
-    if outcome.reports:
-        count = len(outcome.files)
-        out.print(f"results    {outcome.reports}{os.sep} ({count} files)", soft_wrap=True)
-    if figures := [str(file) for file in outcome.files if file.suffix == ".png"]:
-        line = f"figures    {' '.join(figures)}"
-        out.print(console.wrap(line, out.width, indent=0, hang=11), soft_wrap=True)
-    if place := outcome.recording or outcome.reports:
-        console.show_next(out, *islice(_next_commands(outcome, place), 3))
-
-
-def _sparkline(errors: Sequence[float], room: int) -> str:
-    """Draw error rates as bars beside each other; those that share a bar as the highest."""
-    size = -(-len(errors) // max(room, 1))
-    bars = [max(errors[begin : begin + size]) for begin in range(0, len(errors), size)]
-    return "".join(BARS[int(bar / (max(bars) or 1) * (len(BARS) - 1))] for bar in bars)
-
-
 def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:
-    """Yield the commands to type next, of which the first are the most useful."""
-    facts, path = outcome.facts, quote(str(place))
-    yield f"roadeval report {path} -o {quote(place.with_suffix('.html').name)}"
-    yield from _next_step(outcome, place)
-    if outcome.recording and has_screen():
-        yield f"rerun {path}"
-    if facts.totals or facts.unlabelled:
-        yield f"roadeval inspect {path} --list"
-    if outcome.recording and facts.totals:
-        yield f"roadeval inspect {path} --worst 1 --screenshot worst.png"
+    """Yield the commands to type next, the most useful ones first.
 
-
-def _next_step(outcome: Outcome, place: Path) -> Iterator[str]:
-    """Yield the command that the result asks for, if it asks for one.
-
-    It brings labels, compares two masks, or adds the preset for real roads to a weak result.
+    The second one is what the result asks for: it brings labels, compares two masks, or adds the
+    preset for real roads to a weak result.
     """
     facts, path = outcome.facts, quote(str(place))
+    yield f"roadeval report {path} -o {quote(place.with_suffix('.html').name)}"
     log = quote(facts.log.path) if facts.log else "DRIVE.mcap"
     config = path if outcome.recording else quote(str(place / "run.toml"))
     brought = [name for name in facts.finals if name not in (FILTERED, UNFILTERED, BASELINE)]
@@ -139,6 +123,12 @@ def _next_step(outcome: Outcome, place: Path) -> Iterator[str]:
         name = f"{place.stem}_{ROBUST}"
         to = f"--save {quote(f'{name}.rrd')}" if outcome.recording else f"--reports {quote(name)}"
         yield f"roadeval replay {log} --config {config} --variant {ROBUST} {to}"
+    if outcome.recording and has_screen():
+        yield f"rerun {path}"
+    if facts.totals or facts.unlabelled:
+        yield f"roadeval inspect {path} --list"
+    if outcome.recording and facts.totals:
+        yield f"roadeval inspect {path} --worst 1 --screenshot worst.png"
 
 
 def megabytes(file: Path) -> str:

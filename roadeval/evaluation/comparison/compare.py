@@ -155,7 +155,7 @@ class Comparison:
     results: tuple[ComparedResult, ...]
     """The base first."""
     changed_settings: Mapping[str, Mapping[str, tuple[Any, Any]]]
-    """By new result the settings that differ from the base's: both values by name."""
+    """The settings that differ from the base's, by new result: both values by name."""
     changes: tuple[MaskChange, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
     levels: tuple[MaskChange, ...]
@@ -176,7 +176,7 @@ class Comparison:
     """The classes of the truth, if it has any, by their share of the new result's false road."""
 
     def finals(self) -> list[MaskChange]:
-        """Return the final masks, without the baseline's unless there is no other."""
+        """Return the final masks; the baseline's only if there is no other."""
         finals = [change for change in self.changes if change.final]
         return [change for change in finals if change.variant != BASELINE] or finals
 
@@ -233,7 +233,7 @@ def compare(
                     problem = f"{side.label} does not say which log it is of"
                     raise ComparisonError(f"{problem}, so nothing can be compared")
             raise ComparisonError(
-                f"{old.label} and {new.label} are of different drives, whose difference would mix "
+                f"{old.label} and {new.label} are of different drives: a comparison would mix "
                 "the scene with the method; compare results of the same drives"
             )
         part = _compare_two(old, new, matched, settings, across_variants=across_variants)
@@ -399,7 +399,7 @@ def by_drive(
 
     Columns are ``frames``, whether all are ``final``, the summed counts, the means of the frames'
     rates, and ``group``, by drive and camera from ``groups``. Pairs have also the base's counts and
-    rates, which end in ``_base``, and the means of the differences, as ``change_ERR``.
+    rates, which end in ``_base``, and the means of the differences, such as ``change_ERR``.
     """
     import pandas as pd
 
@@ -468,7 +468,7 @@ def _mask_changes(
 def _region_changes(
     label: str, drives: pd.DataFrame, pairs: pd.DataFrame | None, settings: EvaluationSettings
 ) -> Iterator[RegionChange]:
-    """Yield the change in each region; arguments are as of `_mask_changes`."""
+    """Yield the change in each region; the arguments are those of `_mask_changes`."""
     for variant in values_of(drives, "variant"):
         for region, title in titles(values_of(drives, "region")).items():
             rows = only(drives, variant=variant, region=region)

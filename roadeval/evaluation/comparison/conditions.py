@@ -87,8 +87,8 @@ class Condition:
         if match is None:
             raise ConditionError(
                 f"{text!r} is no condition; write STAGE.VARIANT.RATE, one of > >= < <=, and a "
-                "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp', and after "
-                "pp 'surely' where the whole interval must lie beyond it"
+                "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'; a 'surely' "
+                "after pp means the whole interval"
             )
         stage, variant, rate, sign, number, unit, surely = match.groups()
         if rate not in QUANTITIES:
@@ -96,8 +96,8 @@ class Condition:
             raise ConditionError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
         if surely and unit == "%":
             raise ConditionError(
-                "'surely' asks for the interval of a change (pp); a level (%) is that of the "
-                "frames themselves and has none: leave out 'surely', or limit the change",
+                "'surely' asks for the interval of a change (pp), and a level (%) has none: leave "
+                "out 'surely', or limit the change",
                 where=repr(text),
             )
         if surely and rate not in COMPARED:

@@ -54,7 +54,7 @@ class Line(NamedTuple):
     """``(T,)`` the same as if every run had the drives of the last one."""
     ends: Floats
     """``(2, T)`` ends of the interval of each run's mean change over its drives, around the level;
-    empty but for `TESTED` of all pixels, and NaN with too few drives."""
+    only for `TESTED` of all pixels, else empty; NaN with too few drives."""
     noise: float
     steps: tuple[ChangePoint, ...]
     drive_rates: Floats
@@ -91,9 +91,9 @@ def find_lines(
 
     ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
     ``part`` of the pixels: its rates as fractions, the drive's ``group``, ``pixels`` as
-    `number_pixels` has them, and the columns of the drives' ``tags``, whose names are given. All
-    lines are one family, see `roadeval.evaluation.stats.steps`; ``confidence`` is that of the
-    intervals around levels.
+    `number_pixels` has them, and the columns of the drives' tags; ``tags`` has the names of the
+    tags by column. All lines are one family, see `roadeval.evaluation.stats.steps`; ``confidence``
+    is that of the intervals around levels.
     """
     places = {**group_rows(rows, ["variant", "kind", "part"]).indices}
     for column, tag in tags.items():
@@ -163,7 +163,7 @@ def _ends(
 ) -> Floats:
     """Return the ends, ``(2, T)``, of Student's interval over groups around each run's level.
 
-    It is that of the drives' changes from their own means since the last step.
+    It is computed from the drives' changes from their own means since the last step.
     """
     ends, group = np.full((2, len(values)), np.nan), drives["group"].factorize()[0]
     member = group[:, None] == np.unique(group)
@@ -182,7 +182,7 @@ def _ends(
 
 
 def _stretches(there: Flags) -> Iterator[Sums]:
-    """Yield the positions of runs of which each has a drive in common with an earlier one.
+    """Yield positions of runs in groups: each run shares a drive with an earlier one of its group.
 
     ``there`` is ``(T, D)``. Runs without any drive are left out.
     """

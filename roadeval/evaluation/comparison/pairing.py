@@ -244,7 +244,7 @@ def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
 def disagreements(
     table: pd.DataFrame, pairs: pd.DataFrame, base: str, new: str
 ) -> Iterator[Disagreement]:
-    """Yield the frames on which two variants of a run disagree most, but one of neighbours only.
+    """Yield frames on which two variants of a run disagree most, one of neighbours only.
 
     ``table`` has the rows of ``disagreements``; only the frames of ``pairs`` are considered.
     """

@@ -53,7 +53,8 @@ def boundary(truth: TruthBits, width: int) -> Bits:
     return grow(truth.road, element, truth) & grow(truth.other, element, truth)
 
 
-def _boundary_and_interior(labelled: LabelledFrame) -> dict[str, Bits]:
+def boundary_and_interior(labelled: LabelledFrame) -> dict[str, Bits]:
+    """Return the pixels near the truth's edge, and all others, ``(H, words)`` each."""
     near = boundary(labelled.truth, labelled.settings.boundary_width)
     return {"boundary": near, "interior": near ^ everywhere(labelled.truth.shape)}
 
@@ -72,7 +73,8 @@ def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
     }
 
 
-def _titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
+def titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
+    """Return the titles of the bands of rows, which number them if the ``height`` is 0."""
     bands = [name for name in names if name.startswith("band_")]
     titles = {}
     for place, name in enumerate(bands):
@@ -83,7 +85,8 @@ def _titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
     return titles
 
 
-def _titles_of_distances(names: Collection[str], _height: int) -> dict[str, str]:
+def titles_of_distances(names: Collection[str], _height: int) -> dict[str, str]:
+    """Return the titles of the distances ahead."""
     bands = [match for name in names if (match := _DISTANCE.fullmatch(name))]
     titles = {match[0]: f"{match[1]} to {match[2]} m ahead" for match in bands}
     if UNPLACED in names:
@@ -98,15 +101,15 @@ REGIONS: Final = (
     Region(
         {"boundary": "near the road's edge", "interior": "away from the road's edge"},
         order=30,
-        find=_boundary_and_interior,
+        find=boundary_and_interior,
     ),
     Region(
-        _titles_of_bands,
+        titles_of_bands,
         order=40,
         find=lambda frame: row_bands(frame.truth.shape, frame.settings.bands),
     ),
     Region(
-        _titles_of_distances,
+        titles_of_distances,
         order=50,
         find=lambda frame: frame.survey.regions if frame.survey else {},
     ),

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 LEAST_GROUPS: Final = 6
 """Groups of drives that an interval needs."""
 STUDENT_FROM: Final = 30
-"""Groups from which on the interval is Student's, which takes the mean for normal."""
+"""Number of groups from which the interval is Student's, which assumes a normal mean."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Difference:
     """NaN if no unit has a difference; null where it is read from JSON."""
     low: float | None
     high: float | None
-    """The interval; within a drive it stays within what the base's rate leaves room for. None
-    together with `p`."""
+    """The interval; within a drive it stays in the range that the base's rate allows. None together
+    with `p`."""
     p: float | None
     """Two-sided p-value of no difference."""
     confidence: float
@@ -66,7 +66,7 @@ class Difference:
     """The mean's standard error; None if `effective` is."""
     degrees: float | None = None
     """Degrees of freedom: the interval is ``mean ± t(degrees) standard_error``, and the p-value
-    that of ``mean / standard_error``, but for skewness and the room that the base leaves."""
+    that of ``mean / standard_error``, apart from skewness and the room that the base leaves."""
     groups: int | None = None
     """Number of groups of drives, each of which counts as one; None within a drive."""
     worse: int | None = None
@@ -189,7 +189,7 @@ def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -
 
 
 def at_moments(cameras: Sequence[tuple[Sums, Floats]]) -> Floats:
-    """Return a value for each moment, ``(T,)``, whose mean is that of the cameras' means.
+    """Return a value for each moment, ``(T,)``; their mean is the mean of the cameras' means.
 
     ``cameras`` have stamps and differences, ``(n,)`` each. The series varies as its mean does: at
     moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)`` over the frames i that were
@@ -329,7 +329,7 @@ def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
     Among the findings whose corrected value is at most ``q``, a share of at most ``q`` is false on
     average: ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [4]_. That holds if the
     tests are independent, as those of different drives are, or depend on each other positively.
-    None stands for what was not tested: it is not counted and stays None.
+    None stands for a finding that was not tested: it is not counted and stays None.
     """
     tested = sorted((p, place) for place, p in enumerate(values) if p is not None)
     corrected, least = list(values), 1.0

@@ -15,7 +15,7 @@ import numpy as np
 from roadeval.data.arrays import Floats, Sums
 
 REGRESSION_FROM: Final = 8
-"""Number of labels from which on the relation of a rate to the frames' scores is learnt."""
+"""Number of labels from which the relation of a rate to the frames' scores is learnt."""
 FAR: Final = 2.0
 """Scores so many interquartile ranges above the upper quartile belong to bursts. If a burst scores
 twice as high as other frames, the interval held in 74 % of draws with 3, in 93 % or more with 2;
@@ -42,12 +42,12 @@ class Estimate:
 
     @property
     def missed(self) -> float:
-        """The greatest share of the frames of which none was drawn with a chance of 5 %."""
+        """The share of frames that the draw misses entirely with a chance of 5 %."""
         return float(1 - 0.05 ** (1 / self.labels))
 
 
 def draw_order(count: int, seed: int) -> Sums:
-    """Return ``count`` frames in an order whose beginnings are all stratified random samples.
+    """Return ``count`` frames in an order; every beginning of it is a stratified random sample.
 
     The first m frames are spread along the drive, and every frame is among them with probability
     m / count exactly, so that further labels can follow the order. The order is that of the van der

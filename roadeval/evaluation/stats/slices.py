@@ -43,30 +43,30 @@ LEAST_FRAMES: Final = 40
 LEAST_INSIDE: Final = {"frames": 10, "drives": 4}
 """Frames, or groups of drives, that each half needs inside a slice, and outside."""
 BLOCKS: Final = 8
-"""Most blocks of a drive."""
+"""Greatest number of blocks of a drive."""
 INDEPENDENT: Final = 20
 """Independent frames that a drive needs, and each block if there are more than two."""
 QUANTILES: Final = (0.2, 0.4, 0.6, 0.8)
-"""Quantiles of a quantity on the searching half at which its limits lie."""
+"""Quantiles of a quantity, on the searching half, that become its limits."""
 BEST: Final = 12
 """Conditions that are combined with all others."""
 LEAST_RATIO: Final = 1.25
 """Least ratio that is worth a sentence, on both halves."""
 GAIN: Final = 1.1
-"""Factor by which two conditions must have a higher ratio than each of them alone."""
+"""Two conditions together must have a ratio this many times that of each of them alone."""
 SURE: Final = 0.05
-"""Greatest p-value on the searching half of what is tested on the other."""
+"""Greatest p-value on the searching half of slices that are tested on the other half."""
 TRIED: Final = 20
-"""Most slices of each kind that are looked at closely."""
+"""Greatest number of slices of each kind that are looked at closely."""
 TESTED_SLICES: Final = 2
-"""Most slices that are tested, of whole frames and of parts of the image each."""
+"""Greatest number of slices that are tested, both of whole frames and of parts of the image."""
 OVERLAP: Final = 0.5
 """Greatest share of common frames of two slices that are tested."""
 SHOWN: Final = 3
 ON_CLASS: Final = "on "
 """Prefix of a part that is a class of the truth."""
 SCENES: Final = 30
-"""Stretches of a drive of which each has at most one of the frames that are shown."""
+"""Number of stretches of a drive; at most one frame of each is shown."""
 
 
 @dataclass(frozen=True)
@@ -273,7 +273,7 @@ class _Search:
     def _sides(self, flags: Flags, part: str, rows: Flags, units: Places, of: str = "") -> Floats:
         """Return the pixels inside, of ``part`` where ``flags`` are set, and all others of ``of``.
 
-        Of drives they are weighted, see `_within_drives`.
+        For drives they are weighted, see `_within_drives`.
         """
         starts = np.flatnonzero(np.diff(units[rows], prepend=-1))
         sides = []
@@ -330,8 +330,9 @@ class _Search:
 def _within_drives(wrong: Floats, rest: Floats, labelled: Floats, rest_labelled: Floats) -> Floats:
     """Return sides by drive, weighted.
 
-    The weights are those of Mantel and Haenszel, so that each drive is compared with itself. What
-    no drive has both inside and outside, as a tag, is compared between drives, without weights.
+    The weights are those of Mantel and Haenszel, so that each drive is compared with itself. If no
+    drive has pixels both inside and outside, for example with a tag, drives are compared with each
+    other, without weights.
     """
     sides, both = np.array([wrong, rest, labelled, rest_labelled]), labelled + rest_labelled
     weighted = sides * [rest_labelled, labelled, rest_labelled, labelled] / both

@@ -1,6 +1,6 @@
 """Steps, drifts and outliers of a rate over many runs of the same drives.
 
-Runs are looked at in their order, and the search starts anew after a step: D. M. Hawkins, P. Qiu,
+Runs are looked at in their order, and the search starts again after a step: D. M. Hawkins, P. Qiu,
 C. W. Kang, Journal of Quality Technology 35, 2003, 355-366.
 """
 
@@ -130,7 +130,7 @@ def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[
 
 
 def _fit(level: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return what runs up to i lose at the level of run j, the least for i, and two levels' gain.
+    """Return the loss of runs up to i at the level of run j, its least for i, and the gain of two.
 
     The loss is -2 log-likelihood. The gain of look i is that of the best place for a step.
     """

@@ -72,20 +72,21 @@ def audit(
     source
         A recording or the results folder beside it, or a log, which is replayed first.
     count
-        The most labels that are named, one a scene.
+        Greatest number of labels that are named, one for each scene.
     folder
-        Where images, labels to correct, and pictures of what looks wrong land; nowhere by default.
+        Folder for images, labels to correct, and pictures of labels that look wrong; none by
+        default.
     config
-        How a log is replayed; by default with the preset `PRESET`.
+        Configuration for the replay of a log; by default the preset `PRESET`.
     labels
-        In which format the labels are written for correction: ``png`` or ``coco``.
+        Format of the labels that are written for correction: ``png`` or ``coco``.
     annotators
         The variants whose masks are another person's labels.
 
     Raises
     ------
     RoadevalError
-        If there are no labels to look at, or the folder holds something else.
+        If there are no labels to look at, or the folder is not empty.
     """
     path, config = Path(source), config or configure({"preset": PRESET})
     output = None if folder is None else Path(folder)

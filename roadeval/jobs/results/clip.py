@@ -1,4 +1,4 @@
-"""Short films of the frames on which a result fails, and the log's own messages of these."""
+"""Short films of the frames on which a result fails, and their messages in the log."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def clip(
 ) -> tuple[list[Path], list[str]]:
     """Write short films of where a result fails; return them, and the losses of the log, if any.
 
-    Errors are painted over the camera, those of the ``focus`` on the left, of the best other
-    variant beside it. The result is a recording, the folder of its results, or a fleet; the output
-    a folder, or the MP4 or GIF of one clip. Each of the ``worst`` 5 scenes is filmed, or these
-    ``frames``, as ``range(40, 81)``. With ``mcap`` the log's own messages lie beside each clip. A
-    `RoadevalError` if there are no pictures, or a file cannot be written.
+    Errors are painted over the camera image: those of the ``focus`` on the left, and those of the
+    best other variant beside it. The result is a recording, the folder of its results, or a fleet;
+    the output a folder, or the MP4 or GIF of one clip. Each of the ``worst`` 5 scenes is filmed, or
+    these ``frames``, such as ``range(40, 81)``. With ``mcap`` the log's own messages lie beside
+    each clip. A `RoadevalError` if there are no pictures, or a file cannot be written.
     """
     place, films, losses = Path(output), list[Path](), list[str]()
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())

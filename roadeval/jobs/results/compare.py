@@ -74,11 +74,12 @@ def compare(
     Parameters
     ----------
     results
-        Recordings, results folders or fleets' folders. Of a single one the variants are compared.
-        The base may be a folder of many runs: their last good one, see `roadeval.history`.
+        Recordings, results folders or fleets' folders. If there is only one, its variants are
+        compared. The base may be a folder of many runs: their last good one, see
+        `roadeval.history`.
     variants
-        Of several results: only these, where ``a=b`` holds the base's ``a`` against the others'
-        ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
+        For several results: only these, where ``a=b`` compares the base's ``a`` with the others'
+        ``b``. For a single one: these, with the first as the base; by default all, ``unfiltered``
         first.
     fail_if
         Conditions, see `roadeval.evaluation.comparison.conditions`.

@@ -36,7 +36,7 @@ MOVED: Final = 2
 """Frames that a report shows: the worst, and those that the filter helped and harmed most."""
 ERRORS_SHOWN: Final = 6
 LAYERS: Final = 2
-"""Variants of which such a frame shows the errors, and all layers, on paper."""
+"""Number of variants of which such a frame shows the errors, and all layers, on paper."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -109,7 +109,7 @@ class FramePicker:
     def worst(self) -> list[NotableFrame]:
         """Return the worst frames of the focus, one a scene, all worse than the mean.
 
-        Without truth those that are most in doubt, as far as they have pictures.
+        Without truth they are those most in doubt, if they have pictures.
         """
         if self._focus is None:
             unlabelled = self._result.facts.unlabelled

@@ -1,4 +1,4 @@
-"""The history of many results: since when which rate is worse, and what changed then."""
+"""The history of many results: which rate got worse in which run, and what changed then."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 EARLIER: Final = 7
-"""Runs before the last one, with whose mean conditions compare it."""
+"""Number of runs before the last one; conditions compare it with their mean."""
 DETAILED: Final = 5
-"""Newest events of which frames are named."""
+"""Number of newest events with named frames."""
 FRAMES: Final = 5
 DRIVES: Final = 3
-"""Frames that are named of an event, and drives in which they are searched."""
+"""Number of frames that are named for an event, and of drives in which they are searched."""
 NEAR: Final = 10
-"""Runs on both sides of a step whose frames are compared, if there is one drive."""
+"""Number of runs on each side of a step; their frames are compared if there is one drive."""
 BATCH: Final = 30
 """Results whose tables are in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
@@ -81,7 +81,7 @@ def history(
 ) -> History:
     """Read many results as one history, and find which rate changed in which run.
 
-    A `RoadevalError` if fewer than two of them can be read; those that cannot are told.
+    A `RoadevalError` if fewer than two of them can be read; the history lists those that cannot.
 
     Parameters
     ----------
@@ -96,10 +96,10 @@ def history(
         Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    lost: list[str] = []
+    places, lost = list_results(results)
     origins: dict[Path, Origin] = {}
     drives: dict[Path, Result] = {}  # the facts of hundreds of fleets would fill the memory
-    for path in list_results(results):
+    for path in places:
         try:
             result = Result(path)
             if not result.complete:
@@ -143,9 +143,15 @@ def history(
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
 
 
-def list_results(results: Paths) -> list[Path]:
-    """Return the paths of results, and of those below folders."""
-    return [path for place in list_paths(results) for path in find_results(local_path(place))]
+def list_results(results: Paths) -> tuple[list[Path], list[str]]:
+    """Return the paths of results, and of those below folders, and why some are not there."""
+    paths, lost = list[Path](), list[str]()
+    for place in list_paths(results):
+        try:
+            paths += find_results(local_path(place))
+        except RoadevalError as error:
+            lost.append(error.sentence)
+    return paths, lost
 
 
 def find_results(path: Path) -> list[Path]:
@@ -206,7 +212,7 @@ def _runs_in_order(
 
 
 def _origin(result: Result, path: Path) -> Origin:
-    """Return how a result was made; its time is that of its file if it does not say."""
+    """Return how a result was made; if it states no time, that of its file."""
     origin = result.facts.origin or Origin()
     file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
     made_ns = min(max(origin.made_ns or file.stat().st_mtime_ns, 0), 2**63 - 1)
@@ -220,7 +226,7 @@ def _read_rows(
     lost: list[str],
     on_progress: OnProgress,
 ) -> pd.DataFrame:
-    """Return the rows for `find_lines` of results, which are fleets but for the ``drives``."""
+    """Return the rows for `find_lines` of results: of the ``drives``, and of fleets."""
     parts: list[pd.DataFrame] = []
     for begin in range(0, len(paths), BATCH):
         on_progress(Progress(begin, len(paths), "reading", unit="results"))

@@ -16,7 +16,7 @@ from roadeval.evaluation.tables import finals, only
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.results.frames import rates_by_frame
 from roadeval.jobs.results.result import DriveResult, Result
-from roadeval.results.fleet import FleetFolder, recording_path, results_path
+from roadeval.results.fleet import recording_path, results_path
 from roadeval.results.folder import RUN
 from roadeval.results.rows import records
 from roadeval.results.sentences import notes
@@ -125,27 +125,24 @@ def rank_frames(
 
 
 def drive_of(result: Result, frame: WorstFrame) -> tuple[DriveResult, str]:
-    """Return the drive of one of a result's worst frames, and how its frames are called there."""
-    if result.fleet:
-        return DriveResult(recording_of(result.fleet, frame.drive)), f"{frame.drive}, "
+    """Return the drive of one of a result's worst frames, and how its frames are called there.
+
+    A `RoadevalError` if a fleet has not kept its recording, with the command that makes it.
+    """
+    if fleet := result.fleet:
+        drive = frame.drive
+        if (path := recording_path(fleet.path, drive)).exists():
+            return DriveResult(path), f"{drive}, "
+        source = visible(without_secrets(str(fleet.drives.loc[drive, "source"])))
+        config = str(results_path(fleet.path, drive) / RUN)
+        words = ["roadeval", "replay", source, "--config", config, "--record", "worst:10"]
+        words += ["--save", str(path), "--reports", str(Path("reports", drive))]
+        raise RoadevalError(f"{drive}: no recording was kept; make it with: {shlex.join(words)}")
     if result.rig:
         camera = next(drive for drive in result.rig if drive.camera == frame.camera)
         return camera, f"{frame.camera}, "
     assert result.drive is not None
     return result.drive, ""
-
-
-def recording_of(fleet: FleetFolder, drive: str) -> Path:
-    """Return the recording of a fleet's drive.
-
-    A `RoadevalError` if it was not kept, with the command that makes it.
-    """
-    if (path := recording_path(fleet.path, drive)).exists():
-        return path
-    source = visible(without_secrets(str(fleet.drives.loc[drive, "source"])))
-    words = ["roadeval", "replay", source, "--config", str(results_path(fleet.path, drive) / RUN)]
-    words += ["--record", "worst:10", "--save", str(path), "--reports", str(Path("reports", drive))]
-    raise RoadevalError(f"{drive}: no recording was kept; make it with: {shlex.join(words)}")
 
 
 def _nothing_scored(path: Path) -> RoadevalError:
@@ -161,8 +158,8 @@ def of_rank(result: Result, rank: int) -> WorstFrame:
     if rank > len(frames):
         (path,) = result.paths
         raise RoadevalError(
-            f"{path}: there is no worst frame number {rank}: {len(frames)} are ranked, of "
-            "each scene the worst alone"
+            f"{path}: there is no worst frame number {rank}: {len(frames)} are ranked, the "
+            "worst of each scene"
         )
     return frames[-1]
 
@@ -175,7 +172,7 @@ def worst(drive: DriveResult) -> WorstFrame | None:
 
 
 def without_pictures(drive: DriveResult, frame: int) -> str:
-    """Return a sentence on a frame that was scored and whose pictures were not kept, else ""."""
+    """Return a sentence if a frame was scored and its pictures were not kept, else ""."""
     if drive.recording is None or frame in {*drive.pictured} or frame not in {*drive.rows["frame"]}:
         return ""
     return f"the recording has no pictures of frame {frame}, so the views of them are empty"

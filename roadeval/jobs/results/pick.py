@@ -74,26 +74,26 @@ def pick(
     Parameters
     ----------
     source
-        A recording or the results folder beside it, a log, which is replayed first, or a fleet's
-        folder, of which the recordings that were kept are taken; or several of these.
+        A recording or the results folder beside it; a log, which is replayed first; a fleet's
+        folder, with the recordings that it has kept; or several of these.
     count
-        How many frames to label; of several drives each gives as many as its length asks for.
+        Number of frames to label; several drives share it by their lengths.
     folder
-        Where they land; of several drives in a folder each, of its name. Where it holds picks
-        already, these go on: no frame comes twice.
+        Folder of the frames; each of several drives has a folder of its name in it. If it holds
+        picks already, new frames are added: no frame comes twice.
     config
-        How a log is replayed.
+        Configuration for the replay of a log.
     labels
-        In which format the present masks are written for correction: ``png`` or ``coco``.
+        Format of the present masks that are written for correction: ``png`` or ``coco``.
     variant
-        Whose masks, and by whose doubt; by default the first one.
+        Variant with the masks and the doubt; by default the first one.
     seed
-        Of the drawing; picks that go on keep theirs.
+        Random seed of the drawing; existing picks keep theirs.
 
     Raises
     ------
     RoadevalError
-        If nothing can be picked, with what to do.
+        If nothing can be picked; its text says what to do.
     """
     sources = [source] if isinstance(source, str | PathLike) else [*source]
     if not sources:
@@ -152,7 +152,7 @@ def find_recordings(source: Path) -> list[Path]:
             return [source]
         recording = DriveResult(source).viewable
         if recording is None:
-            raise RoadevalError(f"{source}: its recording is not where it was; name that")
+            raise RoadevalError(f"{source}: its recording was moved; name its new place")
         return [recording]
     drives = FleetFolder(source).drives
     return [path for name in drives.index if (path := recording_path(source, name)).exists()]
@@ -238,7 +238,9 @@ def _begin_picks(
         raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
     stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
     if len({*stamps}) < len(stamps):
-        raise RoadevalError(f"{source}: several frames have one stamp, so no label finds its own")
+        raise RoadevalError(
+            f"{source}: several frames have one stamp, so labels cannot name their frames"
+        )
     doubts = rows[sign].tolist() if sign else [np.nan] * len(rows)
     (variant,), identity = values_of(rows, "variant"), drive.properties.get("input")
     return Picks(

@@ -117,7 +117,7 @@ def write_figures(
     folder
         Made if it is not there. Files of these names are replaced.
     width
-        Of each figure, as ``8.5cm``, ``85mm`` or ``3.35in``. Letters keep their size.
+        Width of each figure, such as ``8.5cm``, ``85mm`` or ``3.35in``. Letters keep their size.
     title
         ``none`` leaves out the lines above a figure, for a text with captions of its own.
     """
@@ -153,10 +153,25 @@ def findings_of(result: Result) -> Findings | FleetFolder:
     """Collect what the report of a result shows."""
     if result.fleet:
         return result.fleet
-    if result.rig:
-        return collect_rig(result)
-    assert result.drive is not None
-    return collect(result.drive)
+    if not result.rig:
+        assert result.drive is not None
+        return collect(result.drive)
+    by_camera = {drive.camera: collect(drive) for drive in result.rig}
+    first, names, facts = next(iter(by_camera.values())), short_names([*by_camera]), result.facts
+    assert isinstance(facts, Facts)
+    return Findings(
+        path=first.path,
+        facts=facts,
+        complete=first.complete,
+        again=first.again,
+        pictured=sum(findings.pictured for findings in by_camera.values()),
+        thumbnails=[
+            replace(image, title=f"{names[camera]}, {image.title}")
+            for camera, findings in by_camera.items()
+            for image in findings.thumbnails[:1]
+        ],
+        cameras=by_camera,
+    )
 
 
 def page_of(result: Result, on_progress: OnProgress = ignore, folder: Path = Path()) -> Report:
@@ -210,24 +225,4 @@ def collect(result: DriveResult) -> Findings:
         helped=picker.moved([], harmed=False),
         harmed=picker.moved(worst, harmed=True),
         camera=result.camera,
-    )
-
-
-def collect_rig(result: Result) -> Findings:
-    """Collect everything that the report of several cameras shows."""
-    by_camera = {drive.camera: collect(drive) for drive in result.rig}
-    first, names, facts = next(iter(by_camera.values())), short_names([*by_camera]), result.facts
-    assert isinstance(facts, Facts)
-    return Findings(
-        path=first.path,
-        facts=facts,
-        complete=first.complete,
-        again=first.again,
-        pictured=sum(findings.pictured for findings in by_camera.values()),
-        thumbnails=[
-            replace(image, title=f"{names[camera]}, {image.title}")
-            for camera, findings in by_camera.items()
-            for image in findings.thumbnails[:1]
-        ],
-        cameras=by_camera,
     )

@@ -78,9 +78,9 @@ def local_path(result: str | Path) -> Path:
 
 
 class DriveResult:
-    """The result of a replay, from an ``.rrd`` or a results folder; of a rig that of a ``camera``.
+    """The result of a replay, from an ``.rrd`` or a results folder; for a rig that of a ``camera``.
 
-    It is about ``focus`` if it has that variant, or else about what it was made about. A
+    Its focus is ``focus`` if it has that variant, else the focus with which it was made. A
     `RoadevalError` if it is neither, or by another program or format.
     """
 
@@ -90,7 +90,7 @@ class DriveResult:
         self._chosen: Final = focus
         self.recording: Recording | None = None
         if not self.path.is_dir():
-            # Only here: a folder is read without what reads a recording.
+            # Only here: a folder is read without the library that reads recordings.
             from roadeval.recording.recording import Recording
 
             self.recording = Recording(self.path, camera)
@@ -154,7 +154,7 @@ class DriveResult:
 
     @cached_property
     def facts(self) -> Facts:
-        """The facts; of an incomplete run, what its tables give."""
+        """The facts; for an incomplete run, those that follow from its tables."""
         facts = self._written_facts()
         if self._chosen:
             return with_focus(facts, self._chosen, self.table("unlabelled"))
@@ -205,7 +205,7 @@ class DriveResult:
         return Key(visible(self.name), visible(self.facts.drive.camera))
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return the rows of a table, as ``oracles``; none where the run counted none.
+        """Return the rows of a table, such as ``oracles``; none where the run counted none.
 
         A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
         are left out, and so are sums over all frames.
@@ -286,8 +286,8 @@ Opened = DriveResult | FleetFolder
 class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 
-    A `RoadevalError` if one is none of these, or was made by another program or format, or none of
-    them has the focus.
+    A `RoadevalError` if a path leads to none of these, or to a result of another program or format,
+    or if no result has the focus.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ class Result:
 
     @cached_property
     def facts(self) -> Facts | FleetFacts:
-        """The facts of the first result; of several cameras of a drive those of all together."""
+        """The facts of the first result; for several cameras of a drive, those of all together."""
         (path, *_), first = self.paths, self._opened[0].facts
         if not self.rig:
             return first
@@ -476,7 +476,7 @@ class Result:
     def table(self, name: str, drives: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
         """Return a table of all drives, or of some, by drive and camera.
 
-        Of a fleet's ``regions`` it has the rows of final masks alone.
+        The table ``regions`` of a fleet has the rows of final masks alone.
         """
         parts = []
         for result in self._opened:
@@ -489,7 +489,7 @@ class Result:
 
 
 def number_settings(run: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a run that may change its numbers, by names as ``frames.scale``."""
+    """Return the settings of a run that may change its numbers, by ``table.key``."""
     settings: dict[str, Any] = {}
     for table, values in run.items():
         if table in NO_NUMBER:
@@ -500,7 +500,7 @@ def number_settings(run: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def input_digests(facts: Facts) -> dict[str, str]:
-    """Return the digests of what a run took from files, by names as ``masks mine``."""
+    """Return the digests of what a run took from files, by names such as ``masks mine``."""
     digests = {}
     for variant, stages in facts.methods.items():
         for about in filter(lambda stage: isinstance(stage, Mapping), stages.values()):

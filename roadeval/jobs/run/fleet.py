@@ -238,7 +238,7 @@ class FleetRun:
                 future.cancel()
 
     def _reason(self, error: Exception, doing: str) -> str:
-        """Return why a task has failed; what ends the whole run is raised."""
+        """Return why a task has failed; an error that ends the whole run is raised."""
         if isinstance(error, RoadevalError):
             raise error
         if isinstance(error, CancelledError):
@@ -246,7 +246,7 @@ class FleetRun:
             raise FleetError(problem, where=self.folder, remedy=fleet_work.GO_ON) from error
         if is_worker_death(error):
             return (
-                f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
+                f"its worker process ended {ATTEMPTS} times while {doing}, as it does when memory "
                 "runs out"
             )
         return " ".join(f"{type(error).__name__}: {error}".split())

@@ -113,8 +113,8 @@ def replay_drive(task: DriveTask) -> Done:
     """Replay a drive into the fleet's folder, unless it is done already.
 
     While another command works on the same drive, this one waits for it. A `FleetError` if the
-    fleet's disk fails, or the worker has other software: any problem of the drive itself is told
-    in `Done`.
+    fleet's disk fails, or the worker has other software: `Done` names any problem of the drive
+    itself.
     """
     _check_software(task.software, task.config)
     model = task.config.training.model
@@ -140,7 +140,7 @@ def find_valid(task: DriveTask) -> Made | None:
 
 
 def report_drive(folder: Path, made: Made, *, repeated: bool = False) -> Done:
-    """Return what the fleet's command is told of a drive."""
+    """Return the report on a drive for the fleet's command."""
     if made.problem:
         return Done(made.drive, FAILED, made.problem, made.asked, repeated)
     row = drive_row(Facts.read(results_path(folder, made.drive) / SUMMARY), "", "")
@@ -148,7 +148,7 @@ def report_drive(folder: Path, made: Made, *, repeated: bool = False) -> Done:
 
 
 def mark_failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
-    """Return that a drive could not be used, and why; what replays have left of it goes."""
+    """Return that a drive could not be used, and why; files of earlier replays are removed."""
     _remove(task, RESULTS, PICTURES, RECORDINGS, *CACHED)
     stamp = stamp_files(task.entry, task.config)
     how = task.fold, task.model or None
@@ -156,7 +156,7 @@ def mark_failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
 
 
 def stamp_files(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
-    """Return what shows at little cost that a drive's log, or masks beside it, did not change.
+    """Return facts that quickly show whether a drive's log, or masks beside it, changed.
 
     Plain data by file: size and times, or of a URL size and tag. None where it cannot be looked at:
     the error is reported where it is read.
@@ -190,7 +190,7 @@ def _check_software(asking: Mapping[str, str], config: RunConfig) -> None:
 
 
 def _try_replay(task: DriveTask) -> Made:
-    """Replay a drive; whatever is wrong with it is in what is returned."""
+    """Replay a drive; the result names any problem."""
     stamp, started = stamp_files(task.entry, task.config), time.perf_counter()
     drive, folder, record = task.entry.id, task.folder, task.record
     output = OutputSettings(
@@ -223,7 +223,7 @@ def _try_replay(task: DriveTask) -> Made:
 
 
 def _remove(task: DriveTask, *folders: str) -> None:
-    """Remove what earlier replays, of something else, have left of a drive in some folders."""
+    """Remove files of a drive that earlier replays of something else have left in some folders."""
     folder, drive = task.folder, task.entry.id
     recording = recording_path(folder, drive)
     paths = {
@@ -245,7 +245,7 @@ GO_ON: Final = "what is done is kept, and the same command again does the rest"
 
 @contextmanager
 def ending_the_run(folder: Path) -> Iterator[None]:
-    """Turn what fails because of the fleet's disk, as every drive would, into a FleetError."""
+    """Raise a `FleetError` for an error of the fleet's disk, which would end every drive."""
     try:
         yield
     except FleetError:

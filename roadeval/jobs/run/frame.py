@@ -1,4 +1,4 @@
-"""A frame through the variants of a run: computed, or as another system has made their masks."""
+"""Masks of a frame by the variants of a run: computed here, or made by another system."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ def run_variant(
     shadow_truth: Truth | None = None,
     known: dict[Any, Any] | None = None,
 ) -> VariantResult:
-    """Run a chain on a frame, and given the truth also with each stage replaced by its oracle.
+    """Run a chain on a frame; with truth also with each stage replaced by its oracle.
 
     ``known`` is what the frame's variants share, see `Chain.run`.
     """
     results = tuple(chain.run(view, known))
     outputs = [result.output for result in results]
-    told = () if truth is None else chain.oracles(view, outputs, truth, shadow_truth)
-    return VariantResult(name, results, dict(told))
+    oracle_results = () if truth is None else chain.oracles(view, outputs, truth, shadow_truth)
+    return VariantResult(name, results, dict(oracle_results))
 
 
 def external_layout(name: str, where: str, *, probable: bool = False) -> VariantLayout:
-    """Describe a variant whose masks another system has made, and where they lie.
+    """Describe a variant with masks of another system, and where they lie.
 
     ``probable`` tells whether they are thresholds on how probable road is.
     """

@@ -127,7 +127,7 @@ class Run:
     """The frames that are not evaluated because the model learnt from them or from neighbours."""
     chains: Mapping[str, Chain]
     layouts: tuple[VariantLayout, ...]
-    """Every variant that is scored, those included whose masks the log carries."""
+    """Every variant that is scored, including those with masks in the log."""
     methods: Mapping[str, Mapping[str, Any]]
     """Facts of stages beside their settings, by variant and stage. They are read before the first
     frame: a file that they name may be gone after the last."""
@@ -315,7 +315,7 @@ COMPUTING: Final = (
 
 
 def deciding(config: RunConfig) -> RunConfig:
-    """Return a configuration without what changes no number: output paths and who computes."""
+    """Return a configuration without settings that change no number: output paths and workers."""
     output = OutputSettings(record=config.output.record, focus=config.output.focus)
     return replace(config, output=output, run=ExecutionSettings(), fleet=FleetSettings())
 
@@ -332,8 +332,8 @@ def computing() -> dict[str, str]:
 def software(config: RunConfig) -> dict[str, str]:
     """Return the versions of all that computes: roadeval, Python, packages, and others' stages.
 
-    Of a stage that is not roadeval's own it is the digest of its file. The processor, and how
-    packages were compiled, are not included.
+    For a stage from outside roadeval it is the digest of its file. The processor, and how packages
+    were compiled, are not included.
     """
     python = ".".join(platform.python_version_tuple()[:2])
     return {"roadeval": VERSION, "python": python, **computing(), **config.others_code()}

@@ -20,7 +20,7 @@ from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import summary
 from roadeval.jobs.run.prepared import Run, deciding, prepare, process
-from roadeval.logs.log import Log, open_log
+from roadeval.logs.log import Log, Traffic, open_log
 from roadeval.logs.writing.writer import SidecarWriter
 from roadeval.recording.layout import RecordRule
 from roadeval.report.images import ExampleFrame
@@ -57,6 +57,8 @@ class Outcome:
     """The rows of ``metres``; empty of a rig, and of a camera that is not known."""
     errors: tuple[float, ...] = ()
     """ERR of the focus frame by frame; empty of a rig."""
+    traffic: Traffic | None = None
+    """The requests and bytes that a log elsewhere has cost; None for one on a disk."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -79,8 +81,8 @@ def replay(
     Parameters
     ----------
     drive
-        An MCAP file, or a rosbag2 folder of split files; or the URL of one, of which only the parts
-        that are needed are read.
+        An MCAP file, a rosbag2 folder of split files, or the URL of an MCAP file; only the parts of
+        it that are needed are read.
     config
         Every option; the defaults of ``roadeval replay`` otherwise. See `roadeval.configure` and
         `roadeval.load_config`.
@@ -97,7 +99,7 @@ def replay(
     Raises
     ------
     RoadevalError
-        For whatever a user can mend: one line with what is wrong, where, and what to do.
+        For any problem that a user can mend: one line with the problem, its place, and what to do.
     """
     places = {"save": save, "reports": reports, "mcap": mcap}
     places_given = {name: str(path) for name, path in places.items() if path is not None}
@@ -159,6 +161,7 @@ def _replay_log(
         tracebacks=tracebacks,
         metres=ended[0].metres if len(ended) == 1 else (),
         errors=tuple(of_focus[TESTED].dropna()) if len(ended) == 1 else (),
+        traffic=log.traffic,
     )
 
 
@@ -208,7 +211,7 @@ def _finish_recording(
     results: ResultsWriter,
     config: RunConfig,
 ) -> Facts:
-    """Finish the recording; return the facts, of several cameras those of all together."""
+    """Finish the recording; return the facts, for several cameras those of all together."""
     if len(runs) == 1:
         if recorder:
             recorder.finish(ended[0].texts)
@@ -261,7 +264,7 @@ def _record_frames(
 def _recorded_texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:
     """Return the results as the recording keeps them: the files' own text.
 
-    What decides no number is left out, so that the same input gives the same recording.
+    Settings that change no number are left out, so that the same input gives the same recording.
     """
     config = deciding(run.config)
     return {

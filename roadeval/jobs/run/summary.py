@@ -1,4 +1,4 @@
-"""The facts of a run: what it found, on which frames, by which settings."""
+"""The facts of a run: its findings, its frames and its settings."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ FEW: Final = 12
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 """Signs that a frame has by itself, without the one before."""
 OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "why", "seconds")
-"""Facts that the cameras of a rig do not have together."""
+"""Facts that a camera has, but not a whole rig."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
@@ -131,7 +131,7 @@ def _estimate_rates(run: Run, frames: pd.DataFrame) -> EstimateFacts | None:
 
 
 def _why_not_random(run: Run, picks: Picks) -> str:
-    """Return why the labelled frames are no random part of the drive; empty if they are."""
+    """Return why the labelled frames are not a random part of the drive, or an empty text."""
     if picks.log != run.log.digest:
         return "the log is not as it was when its frames were picked: pick again, into a new folder"
     seen, labelled = run.frames.accounting, run.config.frames.labelled
@@ -141,7 +141,7 @@ def _why_not_random(run: Run, picks: Picks) -> str:
 
 
 def misfits_of_truth(log: Log) -> Iterator[str]:
-    """Yield how the truth of a log does not fit its images, by a few frames and neighbours."""
+    """Yield how the truth does not fit the images, judged by a few frames and neighbours."""
     selection = log.select()
     numbers = selection.among_truth(log.frames(selection).numbers)
     places = np.linspace(0, len(numbers) - 1, FEW, dtype=int).tolist()
@@ -157,7 +157,7 @@ def misfits_of_truth(log: Log) -> Iterator[str]:
 
 
 def misfit_sentence(finding: Finding, selection: Selection, config: LogConfig) -> str:
-    """Return what of truth or masks does not fit the images, and what to do about it."""
+    """Return a sentence on truth or masks that do not fit the images, and what to do about it."""
     rate, is_truth = selection.image.rate_hz, finding.subject == TRUTH
     period_ms = 1000 / rate if rate else None
     source = selection.truth if is_truth else selection.masks[finding.subject]
@@ -179,11 +179,12 @@ def misfit_sentence(finding: Finding, selection: Selection, config: LogConfig) -
 
 
 def _best_thresholds(run: Run) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield what the threshold of the training frames would bring to methods that learn nothing."""
+    """Yield the thresholds that are best on the training frames, for methods that learn nothing."""
     best = run.board.thresholds()
     masks = [(name, mask.threshold) for name, mask in run.config.masks.items()]
     lines_of = {name: at for name, at in masks if at is not None and name not in run.chains}
-    # Five digits tell codes apart; road is what exceeds a code, but what reaches masks' threshold.
+    # Five digits tell codes apart. Road is above the code of a stage, but at or above the threshold
+    # of masks.
     lines = dict.fromkeys(lines_of, ("threshold = {:.5f}", 0.5 / CERTAIN))
     for variant in run.variants:
         stages = variant.pipeline.settings
@@ -208,7 +209,7 @@ def join_cameras(
     cameras: Mapping[str, Facts],
     stated: dict[str, TableFacts],
 ) -> Facts:
-    """Return the facts of a rig: of its cameras together, each of which counts the same."""
+    """Return the facts of a rig, in which every camera counts the same."""
     first, *_ = cameras.values()
     by_camera = tables.totals(frames, ["camera", *tables.MASK])
     empty: Mapping[str, Any] = {name: {} for name in OF_ONE_CAMERA}
@@ -243,7 +244,7 @@ def join_cameras(
 
 
 def _add_counts(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
-    """Add up the cameras' counts, by two names each."""
+    """Add up the counts of cameras, which are trees of two names."""
     sums: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for part in parts:
         for name, counts in part.items():
@@ -252,7 +253,7 @@ def _add_counts(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, d
 
 
 def _name_cameras(sentences: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Yield the cameras' sentences: with the camera's name, but for what all say."""
+    """Yield the cameras' sentences, with the camera's name unless all cameras say the same."""
     first, *others = sentences.values()
     common = [sentence for sentence in first if all(sentence in other for other in others)]
     yield from common
@@ -261,7 +262,7 @@ def _name_cameras(sentences: Mapping[str, Sequence[str]]) -> Iterator[str]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of roadeval, Python, what computes, and what writes files."""
+    """Return the versions of roadeval, of Python, and of the libraries that compute or write."""
     writing = discovery.versions_of(("rerun-sdk", "pandas", "matplotlib"))
     return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
@@ -307,7 +308,7 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
 
 
 def _truth_warnings(run: Run) -> Iterator[str]:
-    """Yield what follows from a log with little truth, or none, for the frames that are shown."""
+    """Yield warnings for a log with little truth, or none."""
     if missing := run.selection.no_truth:
         no_truth = "there is no road truth to score against, only masks to look at: {}"
         yield Sentence(no_truth, missing)
@@ -319,19 +320,19 @@ def _truth_warnings(run: Run) -> Iterator[str]:
                 f"{unlabelled.sign} of {unlabelled.variant}"
             )
             if unlabelled.sign not in RANKS_AT_ONCE:
-                alone = "one method alone says nothing by which a frame could rank"
+                alone = "one method alone gives nothing to rank frames by"
                 pictures = f"kept no pictures: {alone}"
             yield Sentence("without truth {output.record} {} {}", rule, pictures)
     if run.config.frames.labelled:
         yield (
-            "only frames with truth were read: windows are of frames that follow each other among "
-            "these, and flicker is what changes from one to the next, however far apart they are"
+            "only frames with truth were read: windows and flicker are of frames that follow each "
+            "other among these, even if they are far apart"
         )
     if run.selection.truth is not None and not run.frames.accounting.labelled:
         stride = run.config.frames.every
-        why = Sentence(": {frames.every} {} leaves out each one that has", stride)
+        why = Sentence(": {frames.every} {} leaves out all frames that have it", stride)
         problem = "none of the frames that were read has road truth"
-        remedy = Sentence("{frames.labelled} reads only frames that have")
+        remedy = Sentence("{frames.labelled} reads only frames that have it")
         yield Sentence("{}{}; {}", problem, why if stride > 1 else "", remedy)
 
 
@@ -357,14 +358,14 @@ def _pick_warnings(run: Run) -> Iterator[str]:
     if (unchanged := run.frames.accounting.labelled - counted - unread) > 0:
         yield (
             f"{unchanged} labels are as they were proposed, or ignored as a whole, and count as "
-            f"not labelled; of one that is right as it is, empty `proposal` in {PICK}"
+            f"not labelled; if one of them is right, empty its `proposal` in {PICK}"
         )
     if others := len(run.board.apart.keys() - picked):
         yield f"{others} labels are of frames that were not picked: they are in no number"
 
 
 def _method_warnings(run: Run) -> Iterator[str]:
-    """Yield whose outputs are taken for probabilities, and where tuned methods have learnt."""
+    """Yield which outputs are taken for probabilities, and where tuned methods have learnt."""
     for name, stages in run.methods.items():
         probable = stages.get("net", {}).get("taken_for") == "probabilities"
         if probable and not name.endswith(TUNED):
@@ -414,7 +415,7 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
     if run.config.frames.disturb and not run.selection.truth:
         yield Sentence("{frames.disturb}: nothing is disturbed without truth to score against")
     elif run.config.frames.disturb and names:
-        why = "whose masks were made of the images as they are"
+        why = "because their masks were made of the undisturbed images"
         yield Sentence("{frames.disturb}: not for {}, {}", listing(names), why)
 
 

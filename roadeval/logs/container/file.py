@@ -145,6 +145,7 @@ class Container:
         Yields the size of each chunk with no bytes, and of each block with its bytes. A `BadRecord`
         if the disk fails.
         """
+        self.source.expect((chunk.data_offset, chunk.data_end) for chunk in self.chunks)
         for number, chunk in enumerate(self.chunks):
             if number not in self.looked_into:
                 with suppress(BadRecord):
@@ -159,6 +160,7 @@ class Container:
         If a chunk has no checksum, its first bytes take part. A `BadRecord` if the disk fails.
         """
         parts = [b"%d %d" % (len(self.source), self.scan.data_crc)]
+        self.source.expect((c.data_offset, c.data_offset + 4096) for c in self.chunks if not c.crc)
         for chunk, index in zip(self.chunks, self.scan.indexes, strict=True):
             parts.append(b"%d %d %d %d" % (chunk.offset, chunk.size, chunk.data_size, chunk.crc))
             if not chunk.crc:
@@ -171,6 +173,7 @@ class Container:
     def _blocks(self) -> Iterator[bytes]:
         """Yield the log in blocks, and check the checksum of all data."""
         crc, end = 0, self.scan.data_end or 0
+        self.source.expect([(0, len(self.source))])
         for offset in range(0, len(self.source), BLOCK):
             block = self.source[offset : offset + BLOCK]
             yield block

@@ -11,7 +11,7 @@ import struct
 import sys
 import zlib
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,6 +36,8 @@ MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
+CHUNK_BEGIN: Final = HEAD.size + CHUNK_HEAD.size + 64 + 8 + 4
+"""Bytes of a chunk that hold its head; the name of a compression has at most 64, or is damaged."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
 DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
@@ -66,6 +68,14 @@ DOUBTED: Final = 256 << 20
 Buffer = bytes | memoryview
 Entries = npt.NDArray[np.int64]
 """``(n, 2)``: log times of messages, and offsets of their records in the chunk."""
+
+
+class FarFile:
+    """An open file that lies elsewhere, where several requests take no longer than one."""
+
+    def expect(self, parts: Iterable[tuple[int, int]]) -> None:
+        """Begin to read the parts that are needed next, each from a byte up to another."""
+        raise NotImplementedError
 
 
 class FileBytes:
@@ -108,6 +118,11 @@ class FileBytes:
     def left(self) -> int:
         """Bytes that were not read."""
         return self._size - self._at
+
+    def expect(self, parts: Iterable[tuple[int, int]]) -> None:
+        """Say which parts will be read next, in this order: a `FarFile` reads them ahead."""
+        if isinstance(self._file, FarFile):
+            self._file.expect((self.begin + begin, self.begin + end) for begin, end in parts)
 
     def close(self) -> None:
         """Close the file."""
@@ -197,8 +212,7 @@ def parse(opcode: int, body: Buffer) -> Any:
 
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
     """Read a chunk's head; its length of the data may contradict the length of the record."""
-    # The name of a compression has at most 64 bytes; a longer one is damaged.
-    head = source[record.body : record.body + CHUNK_HEAD.size + 64 + 8 + 4]
+    head = source[record.body : record.body - HEAD.size + CHUNK_BEGIN]
     with suppress(struct.error):
         start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
         at = CHUNK_HEAD.size + name_length

@@ -98,6 +98,11 @@ class Scan:
         begun = self.source[0 : len(MAGIC)] == MAGIC
         if not begun:
             self.gaps.append(Gap(0, len(MAGIC), "the file does not begin as it should", False))
+        index_ends, most = self.summary.index_ends, records.IN_MEMORY
+        self.source.expect(  # the indexes of each chunk, and the head of the next one
+            (chunk.data_end, min(index_ends[at], chunk.data_end + most) + records.CHUNK_BEGIN)
+            for at, chunk in sorted(self.summary.chunks.items())
+        )
         record = Record(BORDER, 0, 0, len(MAGIC) if begun else 0)
         while record.opcode != END:
             try:
@@ -214,6 +219,8 @@ class Scan:
         if chunk.cut:
             self.gaps.append(Gap(chunk.offset, chunk.data_end, "the file ends inside a chunk"))
         if self.summary.statistics is None:  # while it is uncompressed
+            if len(self.chunks) == 1:
+                self.source.expect([(chunk.data_offset, len(self.source))])
             with suppress(BadRecord):
                 self.look(len(self.chunks) - 1)
 

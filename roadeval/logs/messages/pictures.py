@@ -269,7 +269,7 @@ class PictureSequence(Protocol):
 
 
 class Video:
-    """The frames of a video topic by position, fastest one after the other.
+    """The frames of a video topic by position; to read them in their order is fastest.
 
     Frames beyond the limits are not decoded.
     """

@@ -37,7 +37,7 @@ RECTIFIED: Final = frozenset({"rect", "rectified", "undist", "undistort", "undis
 
 
 def is_rectified(name: str) -> bool:
-    """Return whether a topic's name says that its images are rectified, as ``/cam/rect/image``.
+    """Return whether a topic's name says that its images are rectified: ``/cam/rect/image``.
 
     RealSense calls images with distortion ``image_rect_raw``.
     """
@@ -90,7 +90,7 @@ def calibration_of(
     except ValueError as error:
         notes.append(f"its place is not known: the transform of {error}")
     if mounting and mounting.has_body_axes:
-        notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read so")
+        notes.append(f"{frame} has the axes of a vehicle, x ahead, and is read as such")
         mounting = replace(mounting, rotation=tuple(_product(np.array(mounting.rotation), OPTICAL)))
         lens = replace(lens, frame_id=f"{frame}_optical")
     return replace(lens, mounting=mounting), Sentence("; ").join(notes)

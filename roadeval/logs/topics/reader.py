@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
@@ -26,7 +26,7 @@ CACHE: Final = 16 << 20
 """Bytes of a topic's small messages in memory. A label's stamp is read long before its picture, and
 its chunk, which holds mostly other topics, is no longer in memory then."""
 ENOUGH: Final = 5
-"""Steps from message to message whose median tells a rate."""
+"""Number of steps from message to message from which the rate is computed."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
 
@@ -310,6 +310,21 @@ class TopicReader:
         """Return whether a message lies in a chunk that turned out to be unreadable."""
         _, number, chunk = self._places[position].tolist()
         return self.channels[number].container.is_bad(chunk)
+
+    def parts(self, log_times: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+        """Yield the bytes of the file that hold messages of some times: those of their chunks."""
+        positions = np.searchsorted(self.log_times[:-1], log_times)
+        for _, number, chunk in self._places[positions].tolist():
+            container = self.channels[number].container
+            if chunk == OUTSIDE:
+                yield 0, 0
+            else:
+                begin, data = container.source.begin, container.chunks[chunk]
+                yield begin + data.data_offset, begin + data.data_end
+
+    def expect(self, parts: Iterable[tuple[int, int]]) -> None:
+        """Say which bytes of its file will be read next, see `FileBytes.expect`."""
+        self._files[0].source.expect(parts)
 
     def chunks_of(self, positions: Sequence[int]) -> int:
         """Count the chunks in which some messages lie; a message outside chunks counts as one."""

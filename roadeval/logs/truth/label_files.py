@@ -29,9 +29,9 @@ from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_input, reading
 
 GREATEST: Final = 256 << 20
-"""Most bytes of a file of labels."""
+"""Greatest number of bytes of a file of labels."""
 VALUES: Final = 20_000_000
-"""Most numbers and texts in it."""
+"""Greatest number of values in it."""
 _BAD_FORMAT: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
 """Exceptions that a reader raises if a file breaks the rules of its format."""
 _UNREADABLE: Final = (*_BAD_FORMAT, LogError, BadMessage, ImageError)
@@ -94,7 +94,7 @@ def _formats() -> dict[str, list[LabelFormat]]:
     """Return the label formats by the endings of their files, those of other packages last."""
     by_ending: dict[str, list[LabelFormat]] = {}
     for format_ in chain(
-        *collect(formats, "FORMATS"), installed("label_formats", LabelFormat, LogError)
+        collect(formats, "FORMAT"), installed("label_formats", LabelFormat, LogError)
     ):
         by_ending.setdefault(format_.ending, []).append(format_)
     return by_ending
@@ -132,7 +132,7 @@ def _read_drawn(
     size: Size | None,
     settings: MaskSettings,
 ) -> LabelSet:
-    """Read the files of a format, of which some are parsed; a `LogError` if no label is in them."""
+    """Read the files of a format, some of them parsed already; a `LogError` without any label."""
     drawings, broken, others = _read_images(files, parsed, format_, size)
     notes = []
     lost = len(broken)
@@ -154,7 +154,18 @@ def _read_drawn(
         where = image if str(files[0]) == str(image) else f"{files[0]}: {image}"
         raise LogError(problem, where=where)
     classes = {name: value for value, name in enumerate(occurring, 1)}
-    drawn = [_named_label(drawing, classes, format_) for drawing in labelled]
+
+    def picture(drawing: DrawnLabel, _content: bytes, limits: Limits) -> Picture:
+        """Return the values of a drawing's classes, ``(H, W)`` uint16, as a picture."""
+        try:
+            pixels = drawing.pixels(classes, limits)
+        except _BAD_FORMAT as error:
+            raise BadMessage(_in_words(error, format_)) from error
+        height, width = pixels.shape
+        data = pixels.astype("<u2").tobytes()
+        return RawPicture(0, width, height, "mono16", 0, big_endian=False, data=data)
+
+    drawn = [NamedLabel(Path(d.image), d.content, partial(picture, d)) for d in labelled]
     drawn += [
         NamedLabel(Path(name), bytes, partial(_raise_problem, problem))
         for name, problem in broken.items()
@@ -202,19 +213,6 @@ def _in_words(error: Exception, format_: LabelFormat) -> str:
 
 def _raise_problem(problem: str, *_: Any) -> Picture:
     raise BadMessage(problem)
-
-
-def _named_label(drawing: DrawnLabel, classes: dict[str, int], format_: LabelFormat) -> NamedLabel:
-    def picture(_content: bytes, limits: Limits) -> Picture:
-        try:
-            pixels = drawing.pixels(classes, limits)
-        except _BAD_FORMAT as error:
-            raise BadMessage(_in_words(error, format_)) from error
-        height, width = pixels.shape
-        data = pixels.astype("<u2").tobytes()
-        return RawPicture(0, width, height, "mono16", 0, big_endian=False, data=data)
-
-    return NamedLabel(Path(drawing.image), drawing.content, picture)
 
 
 NPY: Final = ".npy"

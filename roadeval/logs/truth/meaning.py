@@ -74,13 +74,13 @@ _MASKS: Final = ({0: NON_ROAD, 255: ROAD, 128: IGNORE}, {0: NON_ROAD, 1: ROAD, 2
 """The values of masks that need no settings, and their meaning."""
 TWO_KINDS: Final = Sentence(
     "255 is road in masks of 0 and 255, and ignored in masks of 0 and 1; name what means road "
-    "with {labels.road}, both where both do"
+    "with {labels.road}, or both if both do"
 )
 NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
 )
 LONG: Final = 80
-"""Most letters of a class's name in results."""
+"""Greatest number of letters of a class's name in results."""
 RARE: Final = 0.05
 """A smaller share of the labelled pixels is hardly the road before a vehicle."""
 
@@ -486,7 +486,9 @@ def samples(pictures: LabelPictures) -> Iterator[tuple[int, Picture]]:
     if isinstance(pictures, TopicReader) and not pictures.is_small:
         first = first[: sum(pictures.chunks_of(first[: n + 1]) <= 2 for n in first)]
     spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
-    for position in sorted({*first, *spread}):
+    for looked, position in enumerate(positions := sorted({*first, *spread})):
+        if looked == 1 and isinstance(pictures, TopicReader):  # often the first one does
+            pictures.expect(pictures.parts(pictures.log_times[positions]))
         with suppress(FrameError):
             picture = pictures.picture(position)
             pictures.stamp(position)  # this shows how late labels are logged

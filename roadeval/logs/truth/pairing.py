@@ -84,7 +84,7 @@ class Later:
 class Nearby:
     """Stamps of a topic near a moment; the others are estimated by their log times, not read.
 
-    The delay from stamp to log time is that of the stamps read so far, give or take ``doubt``.
+    The delay from stamp to log time is that of the stamps read so far, to within ``doubt``.
     """
 
     topic: TopicReader
@@ -272,7 +272,7 @@ class Partners:
 
     @cached_property
     def _all_equal(self) -> dict[int, int | None]:
-        """The label of each image that has the same stamp, at whatever distance."""
+        """The label of each image that has the same stamp, at any distance."""
         images, labels = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
         for stamps, places in ((self._pairing.images, images), (self._pairing.labels, labels)):
             for place in range(len(stamps)):

@@ -103,6 +103,7 @@ def train(values: Values, road: Flags, weights: Floats | None, seed: int) -> Hid
     chances = None if weights is None else weights / weights.sum()
 
     def passes() -> Iterator[tuple[Values, Flags, float]]:
+        """Yield noisy pixels, their labels and the step of each pass."""
         for number in range(PASSES):
             drawn = rng.choice(count, count, p=chances)
             noisy = rng.standard_normal((count, pixels.shape[1]), dtype=np.float32)

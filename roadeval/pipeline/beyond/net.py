@@ -23,6 +23,7 @@ def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
     network = Network.of(settings)
 
     def run(view: View) -> Output:
+        """Return the road of a view, and its probability as a map."""
         try:
             output = network.road(view.image)
         except NetworkError as error:

@@ -343,6 +343,7 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
     _, share_spec, _ = layers(settings)
 
     def run(view: View) -> Output:
+        """Return the road of a view, its probability, and the distances from the patch."""
         shape = view.image.shape
         scene, planes = see(settings, view.image, view.opinion)
         if len(planes) != learnt.inputs:

@@ -178,9 +178,9 @@ def regions(
 ) -> list[Chart]:
     """Return the error rate in each region, and its shares of the errors and of the pixels.
 
-    ``rates`` are those of `roadeval.evaluation.tables.by_region`, of which columns are ``shown``
-    with their titles. The charts show the ``variants`` and the regions of ``titles``, from top to
-    bottom.
+    ``rates`` are those of `roadeval.evaluation.tables.by_region`, and ``shown`` has the columns to
+    draw with their titles. The charts show the ``variants`` and the regions of ``titles``, from top
+    to bottom.
     """
     names, rates = rates.index.get_level_values("variant"), 100 * rates.droplevel("variant")
     percents = {variant: rates[names == variant].reindex([*titles]) for variant in variants}
@@ -210,7 +210,7 @@ def trimap(counts: Mapping[str, Mapping[str, Sequence[int]]]) -> Chart:
 
 
 def in_metres(name: str) -> str:
-    """Return a distance, or a band of distances, for people, as ``20 m``."""
+    """Return a distance, or a band of distances, for people, such as ``20 m``."""
     return name.replace("-", DASH).replace("m", " m")
 
 
@@ -242,7 +242,7 @@ def series(name: str, look: Look, x: Any, y: Any) -> Series:
 
 MEAN: Final = "mean over drives"
 DRAWN: Final = 40
-"""Most drives with a row; of more drives the worst and the best have one."""
+"""Greatest number of drives with a row; of more drives the worst and the best have one."""
 Interval = tuple[float | None, float | None, float | None]
 """A mean and the ends of its interval, as fractions."""
 ends_of: Final = attrgetter("mean", "low", "high")

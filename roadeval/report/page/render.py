@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.resources import files
+from itertools import chain, count
 from typing import Any, Final, NoReturn
 
 from roadeval.data.words import MINUS
@@ -56,10 +57,10 @@ def page(document: Report) -> bytes:
         legend=legend,
         caption=caption,
         values=values,
-        source=_source,
-        rows_of=_rows,
+        source=source,
+        rows_of=rows_of,
         variants=variants,
-        variant_of=partial(_variant_of, variants),
+        variant_of=partial(variant_of, variants),
         unknown=_unknown,
     )
     return html.encode("utf-8")
@@ -87,7 +88,7 @@ def _hash(code: str) -> str:
     return f"'sha256-{digest}'"
 
 
-def _variant_of(variants: Sequence[str], text: Cell | str) -> str:
+def variant_of(variants: Sequence[str], text: Cell | str) -> str:
     """Return the variant that a text begins with, as "a", "a: its mask" or a difference from a."""
     words = text if isinstance(text, str) else text.text
     names = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
@@ -111,13 +112,14 @@ def _environment() -> Any:
     return environment
 
 
-def _source(image: ImageFile | bytes) -> str:
+def source(image: ImageFile | bytes) -> str:
+    """Return an image as a data URL."""
     image = ImageFile(image) if isinstance(image, bytes) else image
     media = _MEDIA[image.name.rpartition(".")[2]]
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
 
 
-def _rows(table: Table) -> Iterator[tuple[list[tuple[Cell | str, bool]], str]]:
+def rows_of(table: Table) -> Iterator[tuple[list[tuple[Cell | str, bool]], str]]:
     """Yield a table's rows: cells, with whether each repeats the cell above, and its classes.
 
     An omitted word is the word of the row above, so a row keeps its meaning when the table is
@@ -166,7 +168,12 @@ def sections(blocks: Iterable[Block]) -> list[Section]:
     parts = [Section("", "")]
     taken: set[str] = set()
     for block in _flat(blocks):
-        name = _name(block.text, taken) if isinstance(block, Heading) else ""
+        name = ""
+        if isinstance(block, Heading):
+            plain = re.sub(r"[^a-z0-9]+", "-", block.text.lower()).strip("-") or "part"
+            names = chain([plain], (f"{plain}-{number}" for number in count(2)))
+            name = next(name for name in names if name not in taken)
+            taken.add(name)
         if isinstance(block, Heading) and block.level == 1:
             parts.append(Section(name, block.text))
         else:
@@ -180,14 +187,3 @@ def _flat(blocks: Iterable[Block]) -> Iterator[Block]:
             yield from _flat(block.blocks)
         else:
             yield block
-
-
-def _name(text: str, taken: set[str]) -> str:
-    """Return a name of letters, digits and hyphens that is new on the page."""
-    plain = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
-    name, count = plain, 1
-    while name in taken:
-        count += 1
-        name = f"{plain}-{count}"
-    taken.add(name)
-    return name

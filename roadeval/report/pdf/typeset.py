@@ -63,7 +63,7 @@ def _compile(
     kind: Literal["pdf", "png"] = "pdf",
     pixels_per_inch: int | None = None,
 ) -> bytes:
-    """Compile files, of which one is the main file, to a PDF or PNG.
+    """Compile files, one of them the main file, to a PDF or PNG.
 
     Fonts are Typst's own and, for figures and charts, Matplotlib's DejaVu Sans; never the
     machine's, so that a document looks the same everywhere. A letter that none of them has is an
@@ -93,8 +93,8 @@ def _compile(
             )
     except OSError as error:
         raise ReportError(
-            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are put "
-            f"together there, and it cannot be written ({error.strerror}); make room, or name "
+            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are made "
+            f"there, and it cannot be written ({error.strerror}); make room, or name "
             "another folder with TMPDIR"
         ) from error
     return compiled

@@ -15,7 +15,7 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.why import describe_classes
 
 MOST: Final = 8
-"""Most classes in the charts."""
+"""Greatest number of classes in the charts."""
 LEAST: Final = 0.005
 """Least share of the false road, or of the missed road, of a class in the charts."""
 

@@ -33,7 +33,30 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     ]
     chart = Chart("ERR by disturbance", ChartKind.MARKS, marks, names)
     yield KeepTogether([sentence, Figure([chart], caption("disturbances"))])
-    yield Details("Every disturbance in numbers", [_table(facts), note("disturbance intervals")])
+    family = [c.difference for changes in facts.disturbances.values() for c in changes.values()]
+    rows: list[list[Cell | str]] = [
+        [
+            "" if place else variant_cell(variant, [*facts.finals]),
+            change.text,
+            *map(percent, (change.base_ERR, change.ERR)),
+            points(change.difference.mean),
+            marked_interval(change.difference),
+            number(change.difference.better or 0),
+            number(change.difference.worse or 0),
+        ]
+        for variant, changes in facts.disturbances.items()
+        for place, change in enumerate(changes.values())
+    ]
+    table = Table(
+        ["variant", "disturbed by", "from", "to", TESTED, "interval", "better", "worse"],
+        rows,
+        text_columns=(0, 1),
+        breaks=breaks_of(rows),
+        groups=[("", 2), ("ERR, %", 2), ("points", 2), (family[0].unit, 2)],
+        caption=correction(family),
+        small=True,
+    )
+    yield Details("Every disturbance in numbers", [table, note("disturbance intervals")])
 
 
 def errors_by_variant(facts: Facts | FleetFacts) -> dict[str, dict[str, float | None]]:
@@ -54,29 +77,3 @@ def brief(facts: Facts | FleetFacts) -> Iterator[Block]:
         rows = [[text, *row] for text, row in zip(names, cells, strict=True)]
         legend = caption("disturbances")
         yield Table(["disturbed by", *columns], rows, text_columns=(0,), caption=legend, small=True)
-
-
-def _table(facts: Facts | FleetFacts) -> Table:
-    family = [c.difference for changes in facts.disturbances.values() for c in changes.values()]
-    rows: list[list[Cell | str]] = [
-        [
-            "" if place else variant_cell(variant, [*facts.finals]),
-            change.text,
-            *map(percent, (change.base_ERR, change.ERR)),
-            points(change.difference.mean),
-            marked_interval(change.difference),
-            number(change.difference.better or 0),
-            number(change.difference.worse or 0),
-        ]
-        for variant, changes in facts.disturbances.items()
-        for place, change in enumerate(changes.values())
-    ]
-    return Table(
-        ["variant", "disturbed by", "from", "to", TESTED, "interval", "better", "worse"],
-        rows,
-        text_columns=(0, 1),
-        breaks=breaks_of(rows),
-        groups=[("", 2), ("ERR, %", 2), ("points", 2), (family[0].unit, 2)],
-        caption=correction(family),
-        small=True,
-    )

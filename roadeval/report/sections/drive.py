@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
-from roadeval.data.arrays import Floats
 from roadeval.data.words import DASH, defined, number, percent, points
 from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
-from roadeval.evaluation.stats.difference import Difference
 from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.captions import caption, note
@@ -67,7 +64,14 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         filter_too = "the filter and " * (FILTERED in findings.facts.finals)
         yield Heading(f"What {filter_too}the variants change")
         yield differences_table(findings.facts)
-        yield Text(_about_effects([effect.rates[TESTED] for effect in effects]), "note")
+        changes = [effect.rates[TESTED] for effect in effects]
+        about = [caption("effects", baseline=BASELINE)]
+        if with_interval := [change for change in changes if change.low is not None]:
+            confidence = percent(with_interval[0].confidence, 0)
+            about.append(caption("intervals", confidence=confidence))
+        reasons = dict.fromkeys(change.none_because for change in changes if change.low is None)
+        about += [caption("no interval", reason=reason) for reason in reasons if reason]
+        yield Text(" ".join(filter(None, [*about, correction(changes)])), "note")
     pairs = tables.changes(findings.table("frames"), FILTERED, UNFILTERED)
     of_filter = (e.rates[TESTED] for e in effects if (e.variant, e.base) == (FILTERED, UNFILTERED))
     change = next(of_filter, None) if len(pairs) else None
@@ -84,18 +88,6 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
         yield Details("The filter, frame by frame", [figure])
     yield from _over_time(findings)
-
-
-def _about_effects(changes: Sequence[Difference]) -> str:
-    """Return the note on a table of effects: its baseline, intervals and corrections."""
-    sentences = [caption("effects", baseline=BASELINE)]
-    with_interval = [change for change in changes if change.low is not None]
-    if with_interval:
-        confidence = percent(with_interval[0].confidence, 0)
-        sentences.append(caption("intervals", confidence=confidence))
-    reasons = dict.fromkeys(change.none_because for change in changes if change.low is None)
-    sentences += [caption("no interval", reason=reason) for reason in reasons if reason]
-    return " ".join(filter(None, [*sentences, correction(changes)]))
 
 
 def _over_time(findings: Findings) -> Iterator[Block]:
@@ -154,8 +146,17 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
         return
     trimaps = {n: m["trimap"] for n, m in findings.facts.beyond.items() if "trimap" in m}
     blocks: list[Block] = [Figure([charts.trimap(trimaps)], caption("trimap"))] if trimaps else []
-    if findings.heatmaps:
-        blocks.append(_heat_maps(findings.heatmaps))
+    if maps := findings.heatmaps:  # equal shades are equal shares
+        most = [max(float(np.nanmax(both[n])) for both in maps.values()) for n in (0, 1)]
+        pictures = [
+            (f"{outcome} of {name}", heat_map(shares, top, colour))
+            for name, both in maps.items()
+            for outcome, shares, top, colour in zip(
+                ("FP", "FN"), both, most, (colours.FP, colours.FN), strict=True
+            )
+        ]
+        darkest = dict(zip(("fp", "fn"), (percent(share, 1) for share in most), strict=True))
+        blocks.append(ImageGrid(pictures, 4, caption=caption("heat maps", **darkest)))
     if blocks:
         yield Details("By distance from the road's edge, and by place in the image", blocks)
 
@@ -211,39 +212,17 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         text_columns=(0, 1),
         small=True,
     )
-    blocks = [table, note("perfect stages"), *_perfect_filter(findings, rows)]
-    yield Details("If a stage were perfect", blocks)
-
-
-def _perfect_filter(findings: Findings, oracles: Sequence[Mapping[str, Any]]) -> Iterator[Text]:
-    """Yield whether a filter that finds all shadow, and nothing else, would help."""
-    if not {FILTERED, UNFILTERED} <= findings.facts.totals.keys():
-        return
-    without = findings.total(UNFILTERED)
-    for row in oracles:
-        is_filter = row["oracle"] not in findings.facts.totals[FILTERED]
-        if row["variant"] == FILTERED and is_filter and row["frames"] == without["frames"]:
+    blocks = [table, note("perfect stages")]
+    totals = findings.facts.totals
+    for row in rows if {FILTERED, UNFILTERED} <= totals.keys() else ():
+        is_filter = row["variant"] == FILTERED and row["oracle"] not in totals[FILTERED]
+        without = findings.total(UNFILTERED)
+        if is_filter and row["frames"] == without["frames"]:
             helps = row[TESTED] <= without[TESTED]
             meaning = caption("perfect filter helps" if helps else "perfect filter harms")
             errors = {"perfect": percent(row[TESTED]), "without": percent(without[TESTED])}
-            yield note("perfect filter", **errors, meaning=meaning)
-
-
-def _heat_maps(maps: Mapping[str, Floats]) -> ImageGrid:
-    """Return the places of each variant's errors, see `roadeval.report.findings.Findings.heatmaps`.
-
-    Equal shades are equal shares.
-    """
-    most = [max(float(np.nanmax(shares[place])) for shares in maps.values()) for place in (0, 1)]
-    pictures = [
-        (f"{outcome} of {name}", heat_map(shares, top, colour))
-        for name, by_outcome in maps.items()
-        for outcome, shares, top, colour in zip(
-            ("FP", "FN"), by_outcome, most, (colours.FP, colours.FN), strict=True
-        )
-    ]
-    darkest = dict(zip(("fp", "fn"), (percent(share, 1) for share in most), strict=True))
-    return ImageGrid(pictures, 4, caption=caption("heat maps", **darkest))
+            blocks.append(note("perfect filter", **errors, meaning=meaning))
+    yield Details("If a stage were perfect", blocks)
 
 
 def thresholds(findings: Findings) -> Iterator[Block]:

@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NAMED: Final = 12
-"""Most drives in the table of the worst, and most reasons in a table of missing ones."""
+"""Greatest number of drives in the table of the worst, and of reasons why drives are missing."""
 OF_ONE_REASON: Final = 4
-"""Most drives that are named for one reason."""
+"""Greatest number of drives that are named for one reason."""
 TAGS: Final = 48
-"""Most letters of a drive's tags."""
+"""Greatest number of letters of a drive's tags."""
 _WORDS: Final = ("drive", "state", "group", "tags")
 _SHOWN: Final = (TESTED, "FPR", "FNR")
 
@@ -77,18 +77,6 @@ def main_effects(findings: FleetFolder) -> Iterator[tuple[Effect, str]]:
         best = min(against_blind, key=lambda effect: effect.rates[TESTED].mean)
         which = "" if len(against_blind) == 1 else ", the best variant,"
         yield best, f"What {best.variant}{which} gains over {best.base}"
-
-
-def _differences(findings: FleetFolder) -> dict[str, pd.Series[float]]:
-    """Return the differences of each drive by base: of the focus, if it has any, or of another."""
-    differences = {}
-    for base in BASES:
-        rows = only(findings.effects, base=base)
-        if variants := values_of(rows, "variant"):
-            focus = findings.facts.focus
-            rows = only(rows, variant=focus if focus in variants else variants[0])
-            differences[base] = rows.set_index("drive")["mean"]
-    return differences
 
 
 def table(findings: FleetFolder) -> Iterator[Block]:
@@ -170,11 +158,14 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "tags": [tags.get(drive, "") for drive in rows.index],
         "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
         **{rate: [*map(percent, scores[rate])] for rate in _SHOWN},
-        **{
-            f"against {base}": [*map(points, changes.reindex(rows.index))]
-            for base, changes in _differences(findings).items()
-        },
     }
+    for base in BASES:  # differences of the focus, if it has any, or of another variant
+        effects = only(findings.effects, base=base)
+        if variants := values_of(effects, "variant"):
+            focus = findings.facts.focus
+            effects = only(effects, variant=focus if focus in variants else variants[0])
+            changes = effects.set_index("drive")["mean"].reindex(rows.index)
+            columns[f"against {base}"] = [*map(points, changes)]
     unused = [title for title in ("group", "tags") if not any(columns[title])]
     unused += [] if worst is None else ["state", "group"]
     columns = {title: cells for title, cells in columns.items() if title not in unused}
@@ -187,7 +178,10 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
 
 
 def missing(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the drives that failed by reason, those without truth, and those with losses."""
+    """Yield the drives that failed by reason, those without truth, and those with losses.
+
+    The most frequent reason is the first.
+    """
     drives = findings.drives
     parts = {
         "Drives that failed": only(drives, status=FAILED),
@@ -197,32 +191,27 @@ def missing(findings: FleetFolder) -> Iterator[Block]:
     if any(map(len, parts.values())):
         yield Heading("What is missing")
     for title, rows in parts.items():
-        if len(rows):
-            yield Heading(f"{title}: {number(len(rows))}", 2)
-            yield from _reasons(findings, rows)
-
-
-def _reasons(findings: FleetFolder, rows: pd.DataFrame) -> Iterator[Block]:
-    """Tabulate the drives by reason, the most frequent reason first."""
-    ranked = sorted(by_reason(findings, rows).items(), key=lambda reason: -len(reason[1]))
-    yield Table(
-        ["drives", "which", "reason"],
-        [
-            [number(len(names)), first_of(names, OF_ONE_REASON), reason]
-            for reason, names in ranked[:NAMED]
-        ],
-        text_columns=(0, 1, 2),
-        small=True,
-    )
-    if len(ranked) > NAMED:
-        more = sum(len(names) for _, names in ranked[NAMED:])
-        yield note("further reasons", count=number(more))
+        if not len(rows):
+            continue
+        yield Heading(f"{title}: {number(len(rows))}", 2)
+        ranked = sorted(by_reason(findings, rows).items(), key=lambda reason: -len(reason[1]))
+        yield Table(
+            ["drives", "which", "reason"],
+            [
+                [number(len(names)), first_of(names, OF_ONE_REASON), reason]
+                for reason, names in ranked[:NAMED]
+            ],
+            text_columns=(0, 1, 2),
+            small=True,
+        )
+        if more := sum(len(names) for _, names in ranked[NAMED:]):
+            yield note("further reasons", count=number(more))
 
 
 def by_reason(findings: FleetFolder, rows: pd.DataFrame) -> dict[str, list[str]]:
     """Return the drives' names by their first loss, or by why they failed or have no score.
 
-    Reasons are without the name of the drive's file, with which most of them begin.
+    The name of the drive's file, with which most reasons begin, is left out.
     """
     drives: defaultdict[str, list[str]] = defaultdict(list)
     for drive, row in zip(rows.index, records(rows), strict=True):
@@ -263,10 +252,10 @@ def strata(findings: FleetFolder) -> Iterator[Block]:
 WORST_AT: Final = "#the-worst-frames-over-all-drives"
 """The address of the worst frames' heading on the page of a fleet."""
 SEEN: Final = 12
-"""Most pictures that a page shows at once."""
+"""Greatest number of pictures that a page shows at once."""
 ACROSS: Final = 4
 LONGEST: Final = 20
-"""Most letters of a drive's name below a picture."""
+"""Greatest number of letters of a drive's name below a picture."""
 
 
 def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iterator[Block]:

@@ -36,7 +36,7 @@ SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
 LEAST: Final = 4
 MOST: Final = 6
-"""Least and most pictures of outcomes beside each other."""
+"""Least and greatest number of pictures of outcomes beside each other."""
 
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
@@ -130,7 +130,8 @@ LARGE_ON_PAGE: Final = 520
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
-"""Most frames in the table; the table of a longer drive has those with the highest ERR."""
+"""Greatest number of frames in the table; the table of a longer drive has those with the highest
+ERR."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,29 +270,17 @@ def strip(
     ``variants`` are all scored variants, for their colours; ``command`` opens the frame in the
     viewer; pictures of layers are at most ``layers`` pixels across.
     """
-    return Strip(
-        frame.frame,
-        [*sentences_about(frame)],
-        rates_of(frame, variants) if frame.rates else None,
-        list(_picture_rows(frame, layers)),
-        command,
-    )
-
-
-def _picture_rows(frame: NotableFrame, layers: int) -> Iterator[list[Picture]]:
-    """Yield the pictures of outcomes, and of each variant's layers."""
-    yield [_picture(image, image.title, LARGE_ON_PAGE) for image in frame.images]
-    for row in frame.layers:
-        variant = row[0].title.partition(":")[0] if row else ""
-        names = [
-            image.title if p == 0 else f"{variant}: {image.title}" for p, image in enumerate(row)
-        ]
-        # Without truth people look at the last mask.
-        last = row[-1] if row and not frame.rates else None
-        yield [
-            _picture(image, name, LARGE_ON_PAGE if image is last else layers)
-            for name, image in zip(names, row, strict=True)
-        ]
+    rows = [[_picture(image, image.title, LARGE_ON_PAGE) for image in frame.images]]
+    for images in frame.layers:
+        pictures, variant = [], images[0].title.partition(":")[0] if images else ""
+        for place, image in enumerate(images):
+            name = f"{variant}: {image.title}" if place else image.title
+            # Without truth people look at the last mask.
+            is_large = not frame.rates and image is images[-1]
+            pictures.append(_picture(image, name, LARGE_ON_PAGE if is_large else layers))
+        rows.append(pictures)
+    rates = rates_of(frame, variants) if frame.rates else None
+    return Strip(frame.frame, [*sentences_about(frame)], rates, rows, command)
 
 
 def _picture(image: LayerImage, name: str, width: int) -> Picture:

@@ -66,7 +66,7 @@ def kitti_table(facts: Facts) -> Table:
 def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool = False) -> Table:
     """Tabulate ERR by distance and by area of ground, and the measures of KITTI's benchmark there.
 
-    Below each variant's row stands the range for a camera that stands otherwise, if it is known. A
+    Below the row of a variant is the range for other stances of the camera, if that is known. A
     ``brief`` table has ERR alone.
     """
     places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == TESTED))

@@ -21,10 +21,10 @@ from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import account
 
 LOSSES: Final = 3
-"""Most losses that are named."""
+"""Greatest number of losses that are named."""
 STATUSES: Final = {
     SCORED: "scored",
-    DAMAGED: "scored but for what is lost",
+    DAMAGED: "scored without the lost part",
     UNSCORED: "without truth",
     FAILED: "failed",
 }
@@ -33,10 +33,23 @@ STATUSES: Final = {
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     """Yield the first page."""
     yield Heading("Summary")
-    if isinstance(findings, FleetFolder):
-        yield from _of_drives(findings)
-    else:
+    if isinstance(findings, Findings):
         yield from _of_a_drive(findings)
+        return
+    facts = findings.facts
+    yield Text(facts.verdict, "verdict")
+    yield from why(facts)
+    for frame in records(findings.worst[:1]):
+        where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
+        title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"
+        yield LinkList([(title, WORST_AT)], findings.inspect(frame))
+    if facts.totals:
+        yield rates_table(facts)
+    if facts.effects:
+        yield differences_table(facts)
+        yield note("weights of drives")
+    yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
+    yield _beware([*fleet_warnings(findings)])
 
 
 def _of_a_drive(findings: Findings) -> Iterator[Block]:
@@ -63,23 +76,6 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
             legend = caption("thumbnails", variant=focus, errors=caption("errors"))
         yield ImageGrid(pictures, 4, caption=legend)
     yield _beware([*warnings(findings)])
-
-
-def _of_drives(findings: FleetFolder) -> Iterator[Block]:
-    facts = findings.facts
-    yield Text(facts.verdict, "verdict")
-    yield from why(facts)
-    for frame in records(findings.worst[:1]):
-        where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
-        title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"
-        yield LinkList([(title, WORST_AT)], findings.inspect(frame))
-    if facts.totals:
-        yield rates_table(facts)
-    if facts.effects:
-        yield differences_table(facts)
-        yield note("weights of drives")
-    yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
-    yield _beware([*fleet_warnings(findings)])
 
 
 def why(facts: Facts | FleetFacts, variant: str | None = None) -> Iterator[BulletList]:

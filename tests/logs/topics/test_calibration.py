@@ -360,7 +360,7 @@ def test_a_camera_frame_with_the_axes_of_a_vehicle_is_read_so(tmp_path: Path):
     for lens in (of_body, of_optical):
         apart = Rotation.from_quat(lens.mounting.rotation).inv() * optical
         assert apart.magnitude() == pytest.approx(0, abs=1e-9)
-    assert (why, nothing) == ("cam has the axes of a vehicle, x ahead, and is read so", "")
+    assert (why, nothing) == ("cam has the axes of a vehicle, x ahead, and is read as such", "")
     assert (of_body.frame_id, of_optical.frame_id) == ("cam_optical", "cam")
 
 

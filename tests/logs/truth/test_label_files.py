@@ -137,7 +137,7 @@ def test_labels_that_find_no_frame_are_told(drive, tmp_path):
     run, summary = replay(drive, path, "--sync-tolerance", "30")
     assert summary["frames"]["labelled"] == 2
     assert "1 of the 3 labels of" in run.stderr
-    assert "the first is 49.0 ms from the nearest, and 30.0 may lie between" in run.stderr
+    assert "the first is 49.0 ms from the nearest, and at most 30.0 are allowed" in run.stderr
 
 
 # --- Sizes and damage -----------------------------------------------------------------------------

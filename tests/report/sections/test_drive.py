@@ -239,7 +239,7 @@ def test_a_difference_that_a_wrong_camera_could_explain_is_marked():
     brief = distance_table(rows, NAMES, brief=True)
     assert brief.columns == ["ERR, %", "0\N{EN DASH}10 m", "by area"]
     assert [plain(cell) for cell in brief.rows[0][1:]] == ["10.0", f"{UNSURE}10.0"]
-    assert f"{UNSURE}: a camera that stands" in brief.caption
+    assert f"{UNSURE}: a small error" in brief.caption
 
 
 def test_an_interval_of_errors_ends_at_what_an_error_can_be():

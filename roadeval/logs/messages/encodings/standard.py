@@ -26,12 +26,14 @@ from roadeval.logs.messages.encoding import (
     parts_of,
 )
 
-# --- CDR, the encoding of ROS 2: of either byte order, or XCDR2; compressed by rosbag2 or not -----
-
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 
 
-def _cdr(schema: Schema | None) -> MessageReader | None:
+def cdr(schema: Schema | None) -> MessageReader | None:
+    """Return a reader of CDR, the encoding of ROS 2, in either byte order or as XCDR2.
+
+    Messages that rosbag2 has compressed are read as well.
+    """
     from mcap_ros2.decoder import DecoderFactory
 
     decode = decode_by_library(DecoderFactory(), "cdr", schema)
@@ -69,15 +71,13 @@ def _uncompressed(data: Buffer) -> Buffer:
     import zstandard
 
     if not 0 <= zstandard.frame_content_size(data) <= LARGEST:
-        raise BadMessage("a compressed message of a size that cannot be")
+        raise BadMessage("a compressed message of an impossible size")
     message: bytes = zstandard.ZstdDecompressor().decompress(data)
     return message
 
 
-# --- FlatBuffers, for Foxglove's messages ---------------------------------------------------------
-
-
-def _flatbuffer(schema: Schema | None) -> MessageReader | None:
+def flatbuffer(schema: Schema | None) -> MessageReader | None:
+    """Return a reader of FlatBuffers, for Foxglove's messages alone."""
     import foxglove_schemas_flatbuffer as schemas
 
     fields = fields_of(schema)
@@ -112,32 +112,26 @@ def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
     return SimpleNamespace(**values)
 
 
-# --- JSON: bytes in base 64, or as a list of numbers ----------------------------------------------
-
-
-def _json_message(data: Buffer) -> Any:
+def read_json(data: Buffer) -> Any:
+    """Read a JSON message, with its bytes in base 64 or as a list of numbers."""
     message = json.loads(bytes(data), object_hook=lambda fields: SimpleNamespace(**fields))
     if isinstance(content := getattr(message, "data", None), str):
         message.data = base64.b64decode(content, validate=True)
     elif hasattr(message, "data"):  # else it is no image
-        message.data = bytes([*message.data])  # bytes of a number would be as many zeros
+        message.data = bytes([*message.data])  # bytes(5) would be five zeros
     return message
 
 
-# --- Protocol Buffers, read by the descriptors in a schema ----------------------------------------
-
-
-def _protobuf(schema: Schema | None) -> MessageReader | None:
+def protobuf(schema: Schema | None) -> MessageReader | None:
+    """Return a reader of Protocol Buffers by the descriptors in a schema."""
     from mcap_protobuf.decoder import DecoderFactory
 
     decode = decode_by_library(DecoderFactory(), "protobuf", schema)
     return decode and MessageReader(decode)
 
 
-# --- The encoding of ROS 1: fields in the machine's order, without alignment ----------------------
-
-
-def _ros1(schema: Schema | None) -> MessageReader | None:
+def ros1(schema: Schema | None) -> MessageReader | None:
+    """Return a reader of the encoding of ROS 1: little-endian fields without alignment."""
     from mcap_ros1.decoder import DecoderFactory
 
     decode = decode_by_library(DecoderFactory(), "ros1", schema)
@@ -149,11 +143,9 @@ def _ros1(schema: Schema | None) -> MessageReader | None:
 
 
 ENCODINGS = (
-    Encoding("cdr", _cdr),
-    Encoding("flatbuffer", _flatbuffer),
-    Encoding(
-        "json", lambda _schema: MessageReader(_json_message), without_schema=TopicKind.COMPRESSED
-    ),
-    Encoding("protobuf", _protobuf),
-    Encoding("ros1", _ros1),
+    Encoding("cdr", cdr),
+    Encoding("flatbuffer", flatbuffer),
+    Encoding("json", lambda _: MessageReader(read_json), without_schema=TopicKind.COMPRESSED),
+    Encoding("protobuf", protobuf),
+    Encoding("ros1", ros1),
 )

@@ -1,1 +1,1 @@
-"""Formats of the files of annotation tools; each module here lists its own in ``FORMATS``."""
+"""Formats of the files of annotation tools; each module here defines one as ``FORMAT``."""

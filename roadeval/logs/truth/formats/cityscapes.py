@@ -9,9 +9,10 @@ from typing import Any, Final
 from roadeval.logs.truth import shapes
 
 
-def _read_cityscapes(
+def read(
     path: Path, content: Mapping[str, Any], _: shapes.Size | None
 ) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of the file's image."""
     polygons = (
         shapes.Outline(area["label"], shapes.flatten(area["polygon"]))
         for area in content["objects"]
@@ -20,8 +21,6 @@ def _read_cityscapes(
     yield shapes.DrawnLabel(str(path), shapes.size_in(content, "imgWidth", "imgHeight"), polygons)
 
 
-FORMATS: Final = (
-    shapes.LabelFormat(
-        "Cityscapes", ".json", shapes.has_keys("imgWidth", "imgHeight", "objects"), _read_cityscapes
-    ),
+FORMAT: Final = shapes.LabelFormat(
+    "Cityscapes", ".json", shapes.has_keys("imgWidth", "imgHeight", "objects"), read
 )

@@ -14,9 +14,10 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import shapes
 
 
-def _read_coco(
+def read(
     path: Path, content: Mapping[str, Any], _: shapes.Size | None
 ) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of each image."""
     categories = _by_id(path, "category", content["categories"])
     names = {number: str(category["name"]) for number, category in categories.items()}
     images = _by_id(path, "image", content["images"])
@@ -83,7 +84,7 @@ def lengths_in(text: str) -> Sequence[int]:
     """Return the lengths of runs from COCO's text.
 
     Each letter has five bits of a number, the lowest ones first. From the fourth number on it is
-    the difference from the last but one.
+    the difference from the number two places before.
     """
     lengths: list[int] = []
     value = shift = 0
@@ -127,8 +128,6 @@ def as_coco(proposals: Sequence[shapes.Proposal]) -> dict[str, bytes]:
     return {"instances.json": json.dumps(content).encode()}
 
 
-FORMATS: Final = (
-    shapes.LabelFormat(
-        "COCO", ".json", shapes.has_keys("images", "annotations", "categories"), _read_coco
-    ),
+FORMAT: Final = shapes.LabelFormat(
+    "COCO", ".json", shapes.has_keys("images", "annotations", "categories"), read
 )

@@ -11,7 +11,8 @@ from roadeval.logs.errors import LogError
 from roadeval.logs.truth import shapes
 
 
-def _read_cvat(path: Path, content: Element, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+def read(path: Path, content: Element, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of each image."""
     if content.find("track") is not None:
         raise LogError("tracks of a video", where=path, remedy="export it as CVAT for images")
     for image in content.iter("image"):
@@ -49,8 +50,6 @@ def _shapes(elements: Iterable[Element]) -> Iterator[shapes.Shape]:
                 yield shapes.Undrawn(label, other)
 
 
-FORMATS: Final = (
-    shapes.LabelFormat(
-        "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", _read_cvat
-    ),
+FORMAT: Final = shapes.LabelFormat(
+    "CVAT for images", ".xml", lambda _, content: content.tag == "annotations", read
 )

@@ -28,14 +28,16 @@ _TOOLS: Final = [f"{t}labels" for t in ("polygon", "rectangle", "ellipse", "brus
 _UNREADABLE: Final = {"points": ()}
 
 
-def _is_label_studio(_: Path, content: Any) -> bool:
+def holds(_: Path, content: Any) -> bool:
+    """Return whether a file is a list of tasks."""
     first = content[0] if isinstance(content, list) and content else None
     return isinstance(first, dict) and ("annotations" in first or "annotation_id" in first)
 
 
-def _read_label_studio(
+def read(
     _: Path, content: list[Mapping[str, Any]], size: shapes.Size | None
 ) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of each image."""
     # An image may be in several tasks, and merged projects may have two tasks of one number.
     tasks: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
     sizes: dict[str, shapes.Size | None] = {}
@@ -171,6 +173,4 @@ def _brushed(label: str, numbers: Sequence[int], size: shapes.Size) -> shapes.Ru
     return shapes.runs_of(label, values.reshape(size[1], size[0], 4)[..., 3] > 127)
 
 
-FORMATS: Final = (
-    shapes.LabelFormat("Label Studio", ".json", _is_label_studio, _read_label_studio),
-)
+FORMAT: Final = shapes.LabelFormat("Label Studio", ".json", holds, read)

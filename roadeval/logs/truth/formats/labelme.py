@@ -15,9 +15,10 @@ from roadeval.logs.truth import shapes
 _CORNERS: Final = ("polygon", "rectangle", "rotation", "oriented_rectangle", "quadrilateral")
 
 
-def _read_labelme(
+def read(
     path: Path, content: Mapping[str, Any], _: shapes.Size | None
 ) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of the file's image."""
     lines = ("point", "points", "line", "linestrip")
     areas = (shape for shape in content["shapes"] if shape.get("shape_type") not in lines)
     size = shapes.size_in(content, "imageWidth", "imageHeight")
@@ -43,8 +44,6 @@ def _shape(shape: Mapping[str, Any]) -> shapes.Shape:
             return shapes.Undrawn(label, f"{other} of {len(points) // 2} points")
 
 
-FORMATS: Final = (
-    shapes.LabelFormat(
-        "LabelMe", ".json", shapes.has_keys("shapes", "imageWidth", "imageHeight"), _read_labelme
-    ),
+FORMAT: Final = shapes.LabelFormat(
+    "LabelMe", ".json", shapes.has_keys("shapes", "imageWidth", "imageHeight"), read
 )

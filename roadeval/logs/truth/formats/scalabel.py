@@ -25,11 +25,13 @@ def _frames(content: Any) -> list[Mapping[str, Any]]:
     return content if isinstance(content, list) else []
 
 
-def _is_scalabel(_: Path, content: Any) -> bool:
+def holds(_: Path, content: Any) -> bool:
+    """Return whether a file lists frames with labels."""
     return any("name" in frame and {"labels", "objects"} & {*frame} for frame in _frames(content))
 
 
-def _read_scalabel(_path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+def read(_path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of each image."""
     config = content.get("config") if isinstance(content, dict) else None
     common = shapes.size_in((config or {}).get("imageSize") or {})
     for frame in _frames(content):
@@ -79,4 +81,4 @@ def _ring(label: str, points: Sequence[Sequence[float]], types: str | None) -> S
     return np.ravel(ring).tolist()
 
 
-FORMATS: Final = (shapes.LabelFormat("Scalabel or BDD100K", ".json", _is_scalabel, _read_scalabel),)
+FORMAT: Final = shapes.LabelFormat("Scalabel or BDD100K", ".json", holds, read)

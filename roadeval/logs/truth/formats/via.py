@@ -26,7 +26,8 @@ def _regions(image: Mapping[str, Any]) -> list[Any]:
     return [*regions.values()] if isinstance(regions, dict) else regions
 
 
-def _read_via(path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+def read(path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of each image."""
     regions = [region for image in _images(content) for region in _regions(image)]
     tables = (region.get("region_attributes") for region in regions if isinstance(region, dict))
     names = {name for table in tables if isinstance(table, dict) for name in table}
@@ -69,6 +70,4 @@ def _shape(region: Mapping[str, Any], attribute: str) -> shapes.Shape:
             return shapes.Undrawn(value, str(other))
 
 
-FORMATS: Final = (
-    shapes.LabelFormat("VIA", ".json", lambda _, content: any(_images(content)), _read_via),
-)
+FORMAT: Final = shapes.LabelFormat("VIA", ".json", lambda _, content: any(_images(content)), read)

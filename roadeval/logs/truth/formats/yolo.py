@@ -17,7 +17,8 @@ _LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]|\A\s*\Z", re.MULTILINE)
 """The beginning of a line of labels, which lines with names of classes do not have; or no line."""
 
 
-def _read_yolo(path: Path, content: str, size: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+def read(path: Path, content: str, size: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
+    """Yield the label of the file's image."""
     if size is None:
         raise LogError("its points are shares of the image's size, which is not known", where=path)
     yield shapes.DrawnLabel(str(path), size, _shapes(content, size))
@@ -47,8 +48,6 @@ def _shapes(content: str, size: shapes.Size) -> Iterator[shapes.Shape]:
             yield shapes.Outline(label, flat)
 
 
-FORMATS: Final = (
-    shapes.LabelFormat(
-        "YOLO segmentation", ".txt", lambda _, text: bool(_LINE.search(text)), _read_yolo
-    ),
+FORMAT: Final = shapes.LabelFormat(
+    "YOLO segmentation", ".txt", lambda _, text: bool(_LINE.search(text)), read
 )
