@@ -7,8 +7,8 @@ from copy import deepcopy
 from pathlib import Path
 
 import roadeval
+from roadeval import RoadevalError
 from roadeval.cli.options import with_flags
-from roadeval.errors import RoadevalError
 from roadeval.networks.settings import NetSettings
 from roadeval.recording.layout import RecordingError, SeveralCamerasError
 from roadeval.runtime.sentence import Sentence, Setting

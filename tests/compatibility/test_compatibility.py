@@ -3,8 +3,8 @@
 import pytest
 
 import roadeval
-from roadeval.cli.app import main
 from tests.compatibility.make import MODEL, RECORDING, RESULTS, unpack, versions
+from tests.e2e.commands import here
 
 
 @pytest.fixture(scope="module", params=versions())
@@ -14,15 +14,14 @@ def made(request, tmp_path_factory):
 
 @pytest.mark.parametrize("command", ["report", "compare", "inspect --list"])
 @pytest.mark.parametrize("name", [RECORDING, RESULTS])
-def test_its_version_is_named_and_the_way_out(made, name, command, capsys):
+def test_its_version_is_named_and_the_way_out(made, name, command):
     version, folder = made
-    assert main([*command.split(), str(folder / name)]) == 1
+    run = here(*command.split(), folder / name)
     told = f"made by roadeval {version} in a format that is no longer read: replay the log again\n"
-    out, line = capsys.readouterr()
-    assert not out
-    assert line.startswith(f"roadeval: error: {folder / name}")
-    assert line.endswith(told)
-    assert line.count("\n") == 1
+    assert (run.returncode, run.stdout) == (1, "")
+    assert run.stderr.startswith(f"roadeval: error: {folder / name}")
+    assert run.stderr.endswith(told)
+    assert run.stderr.count("\n") == 1
 
 
 def test_the_version_that_wrote_a_model_is_named(made):

@@ -2,15 +2,20 @@
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
+from roadeval import RunConfig, config_toml, configure, load_config
 from roadeval.cli.options import OPTIONS
-from roadeval.config.run import RunConfig, config_toml, configure, load_config, run_toml
+from roadeval.config.camera_file import read_camera
+from roadeval.config.run import run_toml
 from roadeval.config.settings import SECTIONS
 from roadeval.config.tables import ConfigError
 from roadeval.config.variants import PRESETS, network_variant
 from roadeval.data import RESERVED
+from roadeval.geometry.settings import GroundSettings
 from roadeval.pipeline.stages import STAGES
 
 
@@ -63,6 +68,10 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = [3, -1]",
             r"net\.road: item 2 must be at least 0",
         ),
+        (
+            "[frames]\ndisturb = ['fogg:2']",
+            r"no disturbance 'fogg'; did you mean fog\? choose dark",
+        ),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
         (
             "[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5",
@@ -92,9 +101,37 @@ def test_a_bad_key_or_value_is_named(tmp_path, text, message):
     assert "\n" not in str(caught.value)
 
 
-def test_without_a_file_a_setting_is_named_by_table_and_key():
-    with pytest.raises(ConfigError, match=r"^`frames\.every`: must be at least 1 \(given: 0\)$"):
-        configure({"frames": {"every": 0}})
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        # Without a file a setting is named by table and key.
+        ({"frames": {"every": 0}}, r"^`frames\.every`: must be at least 1 \(given: 0\)$"),
+        ({"training": {"model": "a\0b"}}, "zero byte"),
+        ({"output": {"save": "\0"}}, "zero byte"),
+        ({"masks": {"m": {"path": "a\0"}}}, "zero byte|must name a log"),
+        *(({"variants": {name: {}}}, "reserved") for name in sorted(RESERVED)),
+        *(
+            ({"variants": {name: {}}}, "letters, digits")
+            for name in ("a/b", "", "ä", "a b", "-", "../x")
+        ),
+        (
+            {"masks": {"net": {"path": "a", "thresold": 1}}},
+            r"there is no such setting; did you mean threshold\? choose decide, first",
+        ),
+        ({"masks": {"net": {"path": "a", "threshold": 2}}}, "must be at most 1"),
+        (
+            {"masks": {"net": {"path": "a", "threshold": 0.5, "labels": {"road": [3]}}}},
+            "threshold is for confidence",
+        ),
+        (
+            {"masks": {"net": {"path": "a", "images": "b", "first": 1}}},
+            "with images labels are paired by name",
+        ),
+    ],
+)
+def test_what_cannot_be_set_is_refused(tables, message):
+    with pytest.raises(ConfigError, match=message):
+        configure(tables)
 
 
 @pytest.mark.parametrize(
@@ -120,31 +157,6 @@ def test_a_chain_without_a_mask_cannot_run(chain):
     own = {"variants": {"own": {"chain": chain}}}
     with pytest.raises(ConfigError, match=f"variant own: .*{wrong}"):
         configure(own).resolved()
-
-
-@pytest.mark.parametrize(
-    "tables",
-    [
-        {"training": {"model": "a\0b"}},
-        {"output": {"save": "\0"}},
-        {"masks": {"m": {"path": "a\0"}}},
-    ],
-)
-def test_a_path_with_a_zero_byte_is_refused(tables):
-    with pytest.raises(ConfigError, match=r"zero byte|must name a log"):
-        configure(tables)
-
-
-@pytest.mark.parametrize("name", sorted(RESERVED))
-def test_reserved_names_are_refused(name):
-    with pytest.raises(ConfigError, match="reserved"):
-        configure({"variants": {name: {}}})
-
-
-@pytest.mark.parametrize("name", ["a/b", "", "ä", "a b", "-", "../x"])
-def test_names_that_are_no_plain_word_are_refused(name):
-    with pytest.raises(ConfigError, match="letters, digits"):
-        configure({"variants": {name: {}}})
 
 
 def test_no_stage_is_called_like_a_table_of_the_run():
@@ -181,29 +193,9 @@ def test_masks_are_those_of_the_drive():
     assert (masks.path, masks.threshold) == ("elsewhere", 0.4)
 
 
-def test_what_holds_for_the_whole_run_is_refused_of_a_drive():
+def test_what_is_no_drive_s_and_masks_that_lie_nowhere_are_refused_of_a_drive():
     with pytest.raises(ConfigError, match=r"\[training\] is no table here; choose frames, ground,"):
         configure().of_drive({"training": {}})
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            {"path": "a", "thresold": 1},
-            r"there is no such setting; did you mean threshold\? choose decide, first",
-        ),
-        ({"path": "a", "threshold": 2}, "must be at most 1"),
-        ({"path": "a", "threshold": 0.5, "labels": {"road": [3]}}, "threshold is for confidence"),
-        ({"path": "a", "images": "b", "first": 1}, "with images labels are paired by name"),
-    ],
-)
-def test_bad_masks_are_named(table, message):
-    with pytest.raises(ConfigError, match=message):
-        configure({"masks": {"net": table}})
-
-
-def test_masks_without_a_path_are_refused_with_the_drive():
     with pytest.raises(ConfigError, match=r"\[masks.net\] has no path"):
         configure({"masks": {"net": {"threshold": 0.5}}}).for_drive("a.mcap")
 
@@ -293,18 +285,14 @@ def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tm
     assert load_config(tmp_path / "run.toml") == config
 
 
-@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), config_toml])
-def test_a_tuned_network_reads_back_from_the_file_of_a_run(write, tmp_path):
-    (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = [1, 3]\n')
-    config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
-    config = config.with_tuned(["mine"])
-    (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
-    assert load_config(tmp_path / "run.toml") == config
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_every_preset_reads_back_from_its_file(preset, tmp_path):
-    config = configure({"preset": preset})
+@pytest.mark.parametrize("preset", [*PRESETS, "tuned"])
+def test_every_preset_and_a_tuned_network_read_back_from_the_file_of_a_run(preset, tmp_path):
+    if preset == "tuned":
+        (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = [1, 3]\n')
+        config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
+        config = config.with_tuned(["mine"])
+    else:
+        config = configure({"preset": preset})
     for text in (run_toml(config, "d", "1"), config_toml(config)):
         (tmp_path / "run.toml").write_text(text)
         assert load_config(tmp_path / "run.toml") == config
@@ -333,3 +321,102 @@ def test_a_file_that_the_user_has_not_named_loads_no_code(tmp_path, table):
     assert load_config(path)
     with pytest.raises(ConfigError, match=r"run.toml: its chain names code, tests\.pipeline\.some"):
         load_config(path, trusted=False)
+
+
+# --- Files of calibration tools as the camera of a run --------------------------------------------
+
+
+OST = """\
+image_width: 640
+image_height: 480
+camera_name: narrow_stereo
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [560.5, 0, 318., 0.0, 561.25, 241, 0.0, 0.0, 1.0]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [-0.3, 0.1, 1e-05, -0.002, 0.000000]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [500.0, 0.0, 318.0, 0.0, 0.0, 500.0, 241.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+"""
+FRONT: dict[str, Any] = {
+    "cam_overlaps": [1],
+    "camera_model": "pinhole",
+    "distortion_coeffs": [-0.01, 0.002, 0.0, 1e-05],
+    "distortion_model": "equidistant",
+    "intrinsics": [460.0, 461.0, 380.0, 250.0],
+    "resolution": [752, 480],
+    "rostopic": "/cam0/image_raw",
+}
+REAR = {**FRONT, "intrinsics": [400.0, 400.0, 370.0, 240.0], "rostopic": "/cam1/image_raw"}
+
+
+def given(folder: Path, text: str, topic: str | None = None) -> GroundSettings:
+    path = folder / "camera.yaml"
+    path.write_text(text)
+    return configure({"ground": read_camera(path, topic)}).ground
+
+
+def test_the_file_of_ros_is_read(tmp_path: Path):
+    assert given(tmp_path, f"{OST}height: 1.4\npitch: 3\n") == GroundSettings(
+        height=1.4,
+        pitch=3.0,
+        size=(640, 480),
+        focal=(560.5, 561.25),
+        centre=(318.0, 241.0),
+        model="plumb_bob",
+        distortion=(-0.3, 0.1, 1e-5, -0.002, 0.0),
+    )
+
+
+def test_the_file_of_kalibr_is_read(tmp_path: Path):
+    text = yaml.dump({"cam0": FRONT})
+    assert given(tmp_path, text) == GroundSettings(
+        size=(752, 480),
+        focal=(460.0, 461.0),
+        centre=(380.0, 250.0),
+        model="equidistant",
+        distortion=(-0.01, 0.002, 0.0, 1e-5),
+    )
+
+
+def test_of_several_cameras_the_topic_of_the_images_tells_which(tmp_path: Path):
+    text = yaml.dump({"cam0": FRONT}) + yaml.dump({"cam1": REAR})
+    assert given(tmp_path, text, "/cam1/image_raw/compressed").focal == (400.0, 400.0)
+    with pytest.raises(ConfigError, match=r"several cameras, cam0 \(/cam0/image_raw\), cam1"):
+        given(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (yaml.dump({"cam0": {**FRONT, "camera_model": "omni"}}), "cam0 is of the model omni"),
+        (OST.replace("-0.3", ".nan"), "ground.distortion: item 1"),
+        (OST.replace("560.5", "-1"), "ground.focal: item 1"),
+        (OST.replace("560.5", "fx"), "no camera as ROS's camera_calibration"),
+        (OST.replace("image_width: 640", "image_width: [640]"), "ground.size: item 1"),
+        (OST.replace("  data: [560.5", "  dates: [560.5"), "no camera as ROS's camera_calibration"),
+        (yaml.dump({"cam0": {**FRONT, "intrinsics": []}}), "no camera as ROS's"),
+        ("- 1\n- 2\n", "no camera as ROS's camera_calibration"),
+        ("", "no camera as ROS's camera_calibration"),
+        ("a: &x [1, 1]\nb: [*x, *x]\n", "it has aliases"),
+        ("[" * 60_000, "cannot be read as YAML: it nests more than 32"),
+        (f"{OST}#{'x' * 200_000}", "at most 131,072 are read"),
+        ("!!python/object/apply:os.system ['true']", "cannot be read as YAML"),
+        ("a: [1\nb: }", "cannot be read as YAML"),
+    ],
+)
+def test_what_is_no_camera_is_refused_in_one_line(tmp_path: Path, text: str, message: str):
+    with pytest.raises(ConfigError) as error:
+        given(tmp_path, text)
+    assert message in str(error.value).replace("`", "")
+    assert "\n" not in str(error.value)

@@ -18,9 +18,9 @@ import yaml
 
 import roadeval
 from roadeval.cli.app import app
-from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import DEMO, ROADEVAL, Replayed
 from tests.fixtures.drives import FRAMES, labels, scene, stamp
+from tests.fixtures.logged import write_drive
 from tests.fixtures.make import make
 from tests.networks.making import by_ultralytics, red_network
 from tests.results.fleet.making import fleet_of
@@ -35,18 +35,18 @@ BY_CI = "python3 -m venv .venv"
 """Begins the two commands of README.md, which `.ci/run` runs."""
 
 
-def write_drive(
+def write_scenes(
     path: Path, first: int = 0, cameras: Sequence[str] = ("front",), truth: str = "road_mask"
 ) -> None:
     """Write a drive from this scene on, whose truth, if it has a name, explains itself."""
-    path.parent.mkdir(exist_ok=True)
-    with LogWriter(path) as log:
-        for number in range(FRAMES):
-            for place, name in enumerate(cameras):
-                at, shown = stamp(first + number), first + number + 7 * place
-                log.image(f"/{name}/image", at, encoded(scene(shown)[0][..., ::-1]), "png")
-                if truth:
-                    log.mask(f"/{name}/{truth}", at, labels(shown, 255, 0, 128))
+
+    def messages(number):
+        shown = {name: number + 7 * place for place, name in enumerate(cameras)}
+        images = {f"/{name}/image": scene(shown[name])[0] for name in cameras}
+        masks = {f"/{name}/{truth}": labels(shown[name], 255, 0, 128) for name in cameras if truth}
+        return images | masks
+
+    write_drive(path, ((stamp(n), messages(n)) for n in range(first, first + FRAMES)))
 
 
 def encoded(pixels: np.ndarray) -> bytes:
@@ -120,16 +120,16 @@ def world(tmp_path_factory) -> Path:
         fleet_of(folder / name, 30, seed, frames=5)
     names = ("drive", "monday", "tuesday", "wednesday", "logs/a", "logs/b", "monday/a")
     for i, name in enumerate(names):
-        write_drive(folder / f"{name}.mcap", first=FRAMES * i)
+        write_scenes(folder / f"{name}.mcap", first=FRAMES * i)
     make("drives/street.mcap", folder)
     (folder / "drives" / "street.mcap").rename(folder / "street.mcap")
     (folder / "tuesday").mkdir()
     shutil.copy(folder / "street.mcap", folder / "tuesday")
     write_images(folder)
     write_kitti(folder)
-    write_drive(folder / "bare.mcap", truth="")
+    write_scenes(folder / "bare.mcap", truth="")
     write_coco(folder / "coco.json")
-    write_drive(folder / "rig.mcap", cameras=("front", "left"), truth="labels")
+    write_scenes(folder / "rig.mcap", cameras=("front", "left"), truth="labels")
     red_network(folder / "road.onnx")
     by_ultralytics(red_network(folder / "yolo26n-sem.onnx"), {0: "road"}, imgsz=[24, 32])
     write_segformer(folder / "segformer")
@@ -151,11 +151,11 @@ def results_of_the_demo(folder: Path, done: Replayed) -> None:
     for number, road in roads.items():
         mask = encoded(np.roll(road, 12, axis=1) * np.uint8(255))
         (folder / "masks" / f"{number:04}.png").write_bytes(mask)
-    with LogWriter(folder / "drive.mcap") as bare:
-        for number in range(FRAMES):
-            bare.image("/camera", stamp(number), encoded(demo.image(number)[..., ::-1]), "png")
-            label = encoded(roads[number] * np.uint8(255))
+        if number < FRAMES:
+            label = encoded(road * np.uint8(255))
             (folder / "labels" / f"{number:04}.png").write_bytes(label)
+    images = (demo.image(number) for number in range(FRAMES))
+    write_drive(folder / "drive.mcap", ((stamp(n), {"/camera": i}) for n, i in enumerate(images)))
 
 
 @pytest.fixture

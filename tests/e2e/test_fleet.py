@@ -8,19 +8,15 @@ import shutil
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
-import cv2
 import pyarrow.parquet as pq
 import pytest
 
 import roadeval
-from roadeval.cli.app import main
-from roadeval.errors import RoadevalError
-from roadeval.jobs.results.compare import compare
+from roadeval import RoadevalError, compare
 from roadeval.jobs.run.fleet_work import train_fold
-from roadeval.logs.log import open_log
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.fleet import made_path, results_path
 from tests.e2e.commands import here
+from tests.fixtures.logged import frames_in, write_drive
 from tests.fixtures.make import make
 from tests.training.making import frame
 
@@ -46,14 +42,9 @@ class Here(Executor):
 
 def write(path: Path, first: int) -> Path:
     """Write a short drive; no two of different first numbers share a frame."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with LogWriter(path) as log:
-        for place in range(FRAMES):
-            made, stamp = frame(first + place), (place + 1) * 500_000_000
-            _, png = cv2.imencode(".png", made.image[..., ::-1])
-            log.image("/camera/image", stamp, png.tobytes(), "png")
-            log.mask("/truth/road", stamp, made.truth * 255)
-    return path
+    frames = [frame(first + place) for place in range(FRAMES)]
+    messages = [{"/camera/image": each.image, "/truth/road": each.truth * 255} for each in frames]
+    return write_drive(path, (((n + 1) * 500_000_000, each) for n, each in enumerate(messages)))
 
 
 @pytest.fixture(scope="module")
@@ -206,10 +197,7 @@ class ThreadTasks(ThreadPoolExecutor):
 
 
 def digests(path):
-    config = roadeval.RunConfig()
-    with open_log(path, config) as log:
-        selection = log.select()
-        return {each.decode().digest() for each in log.frames(selection)}
+    return {frame.digest() for frame in frames_in(path)}
 
 
 def test_a_folder_with_other_files_is_refused(drives, tmp_path):
@@ -219,13 +207,13 @@ def test_a_folder_with_other_files_is_refused(drives, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
-def test_a_scheduler_that_does_not_answer_is_one_line(drives, tmp_path, monkeypatch, capsys):
+def test_a_scheduler_that_does_not_answer_is_one_line(drives, tmp_path, monkeypatch):
     monkeypatch.setattr("roadeval.fleet.engine.ANSWER_S", 1)
-    words = ["fleet", str(drives), "-o", str(tmp_path / "f"), "-q"]
-    assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 1
-    said = capsys.readouterr().err
-    assert said.startswith("roadeval: error: --scheduler: tcp://127.0.0.1:9 does not answer")
-    assert said.count("\n") == 1
+    words = "--scheduler", "tcp://127.0.0.1:9", "-q"
+    run = here("fleet", drives, "-o", tmp_path / "f", *words)
+    assert run.returncode == 1
+    assert run.stderr.startswith("roadeval: error: --scheduler: tcp://127.0.0.1:9 does not answer")
+    assert run.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EFBIG])

@@ -13,7 +13,6 @@ import time
 import tomllib
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -21,11 +20,11 @@ from pyarrow import parquet
 from pypdf import PdfReader
 
 from roadeval import Recording
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.facts import digest_of
 from roadeval.runtime.text import as_markdown, visible
 from tests.e2e.commands import here
 from tests.fixtures.figures import drawn
+from tests.fixtures.logged import write_drive
 from tests.jobs.making import NS, write_log
 from tests.results.fleet.making import fleet_of
 from tests.training.making import frame
@@ -43,14 +42,17 @@ DRIVE = f"a {ESCAPES}".replace("/", "") + "$x_{1$ #panic() [red] =cmd() caf\udce
 def folder(tmp_path_factory):
     """A folder with a log full of such names, under such a name."""
     folder = tmp_path_factory.mktemp("hostile")
-    with LogWriter(folder / "plain.mcap") as log:
-        for number in range(14):
-            made, stamp = frame(number), (number + 1) * NS
-            png = cv2.imencode(".png", made.image[..., ::-1])[1].tobytes()
-            log.image(CAMERA, stamp, png, "png")
-            log.image("", stamp, png, "png")
-            log.mask(TRUTH, stamp, made.truth * 255)
-            log.mask(MASKS, stamp, np.roll(made.truth, number, 1) * 255)
+
+    def messages(number):
+        image, truth = (made := frame(number)).image, made.truth
+        return {
+            CAMERA: image,
+            "": image,
+            TRUTH: truth * 255,
+            MASKS: np.roll(truth, number, 1) * 255,
+        }
+
+    write_drive(folder / "plain.mcap", (((n + 1) * NS, messages(n)) for n in range(14)))
     (folder / "plain.mcap").rename(folder / f"{DRIVE}.mcap")
     return folder
 

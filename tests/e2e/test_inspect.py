@@ -9,7 +9,6 @@ import cv2
 import pytest
 
 from roadeval import Recording, Result, configure, replay_fleet
-from roadeval.cli.app import main
 from roadeval.evaluation.tables import only
 from roadeval.jobs.results import inspect as inspecting
 from roadeval.jobs.results.result import DriveResult
@@ -45,7 +44,7 @@ def test_the_viewer_is_drawn_without_a_screen_at_the_worst_frame(demo, tmp_path)
 
 
 @pytest.fixture
-def told(monkeypatch, tmp_path, capsys):
+def told(monkeypatch, tmp_path):
     """Ask for a picture by a viewer that draws nothing; returns what is said of it."""
     monkeypatch.setattr(
         "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
@@ -53,8 +52,9 @@ def told(monkeypatch, tmp_path, capsys):
 
     def told(recording, *words):
         picture = tmp_path / "it.png"
-        assert main(["inspect", str(recording), "--screenshot", str(picture), *words]) == 0
-        return capsys.readouterr().out.removeprefix(f"{picture}: ")
+        run = here("inspect", recording, "--screenshot", picture, *words)
+        assert run.returncode == 0
+        return run.stdout.removeprefix(f"{picture}: ")
 
     return told
 
@@ -68,7 +68,7 @@ def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
 def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(sparse, monkeypatch):
     shown = []
     monkeypatch.setattr("roadeval.recording.viewer.show", lambda path, frame: shown.append(frame))
-    assert main(["inspect", str(sparse.recording)]) == 0
+    assert here("inspect", sparse.recording).returncode == 0
     opened = DriveResult(sparse.recording)
     assert opened.recording.layout.first_frame not in opened.pictured
     assert shown == [min(set(opened.pictured) & {int(r["frame"]) for r in sparse.table("frames")})]
@@ -86,20 +86,17 @@ def test_the_viewer_shows_no_picture_on_a_frame_that_has_none(sparse, tmp_path):
 
 
 @pytest.mark.parametrize("words", [("--worst", "1"), ("--frame",)])
-def test_a_frame_without_pictures_is_drawn_with_a_warning(
-    words, sparse, tmp_path, monkeypatch, capsys
-):
+def test_a_frame_without_pictures_is_drawn_with_a_warning(words, sparse, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
     )
     bad = worst(sparse)
     words = words if len(words) == 2 else (*words, str(bad))
     picture = str(tmp_path / "it.png")
-    assert main(["inspect", str(sparse.recording), "--screenshot", picture, *words]) == 0
-    said = capsys.readouterr()
-    assert said.out == f"{picture}: frame {bad}\n"
+    run = here("inspect", sparse.recording, "--screenshot", picture, *words)
+    assert (run.returncode, run.stdout) == (0, f"{picture}: frame {bad}\n")
     sentence = f"the recording has no pictures of frame {bad}, so the views of them are empty"
-    assert said.err == f"roadeval: warning: {sentence}\n"
+    assert run.stderr == f"roadeval: warning: {sentence}\n"
 
 
 def test_where_nothing_was_scored_frames_are_ranked_by_doubt(unlabelled, told):

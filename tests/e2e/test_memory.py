@@ -4,10 +4,9 @@ import json
 import subprocess
 import sys
 
-import cv2
 import numpy as np
 
-from roadeval.logs.writing.writer import LogWriter
+from tests.fixtures.logged import jpeg, write_drive
 from tests.measuring import PEAK
 
 PERIOD_NS = 100_000_000
@@ -39,11 +38,9 @@ replay(sys.argv[1], save="out.rrd", reports="reports", on_progress=look)
 def write(drive, frames):
     """Write a log of this many noisy frames, the lower half of which is road."""
     noise = np.random.default_rng(0)
-    with LogWriter(drive) as log:
-        for stamp in range(PERIOD_NS, (frames + 1) * PERIOD_NS, PERIOD_NS):
-            image = noise.integers(0, 256, (*ROAD.shape, 3), np.uint8)
-            log.image("/camera", stamp, cv2.imencode(".jpg", image)[1].tobytes(), "jpeg")
-            log.mask("/road_mask", stamp, ROAD)
+    images = (jpeg(noise.integers(0, 256, (*ROAD.shape, 3), np.uint8)) for _ in range(frames))
+    messages = ({"/camera": image, "/road_mask": ROAD} for image in images)
+    write_drive(drive, (((n + 1) * PERIOD_NS, each) for n, each in enumerate(messages)))
 
 
 def test_a_log_three_times_as_long_takes_the_same_memory(tmp_path):

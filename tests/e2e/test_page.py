@@ -19,10 +19,10 @@ from roadeval import Recording
 from roadeval.data import ERRORS
 from roadeval.jobs.results import page
 from roadeval.jobs.results.result import DriveResult
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.report.images import LayerImage, paint
 from tests.e2e.commands import DEMO, here, roadeval
 from tests.fixtures.browser import missing, violations, wait_until
+from tests.fixtures.logged import jpeg, write_drive
 from tests.jobs.test_classes import write_ids
 from tests.networks.making import red_network
 from tests.results.fleet.making import fleet_of
@@ -569,12 +569,11 @@ def killed(tmp_path_factory):
     """The partial recording of a run on sparse truth that is killed at its 42nd of 60 frames."""
     folder, noise = tmp_path_factory.mktemp("killed"), np.random.default_rng(0)
     road = np.repeat(np.uint8([0, 255]), 60)[:, None].repeat(160, axis=1)
-    with LogWriter(folder / "drive.mcap") as log:
-        for stamp in range(1, 61):
-            image = noise.integers(0, 256, (*road.shape, 3), np.uint8)
-            log.image("/camera", stamp * 10**8, cv2.imencode(".jpg", image)[1].tobytes(), "jpeg")
-            if stamp % 3 == 1:
-                log.mask("/road_mask", stamp * 10**8, road)
+    images = {n: jpeg(noise.integers(0, 256, (*road.shape, 3), np.uint8)) for n in range(1, 61)}
+    messages = {
+        n: {"/camera": images[n], "/road_mask": road if n % 3 == 1 else None} for n in images
+    }
+    write_drive(folder / "drive.mcap", ((n * 10**8, each) for n, each in messages.items()))
     command = [sys.executable, "-c", KILLED, "drive.mcap", "42"]
     assert subprocess.run(command, cwd=folder, check=False).returncode == -signal.SIGKILL
     (partial,) = folder.glob("out.*.partial.rrd")

@@ -11,13 +11,10 @@ import pytest
 from PIL import Image
 
 import roadeval
-from roadeval.config.run import configure
-from roadeval.logs.log import open_log
-from roadeval.logs.truth.formats.coco import as_coco
 from roadeval.logs.truth.picks import Picks, Why
-from roadeval.logs.truth.shapes import Proposal
 from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
+from tests.fixtures.logged import coco_of, frames_in
 
 HIDDEN = ("--truth-topic", "", "--config", "quick.toml")
 QUICK = """
@@ -53,19 +50,19 @@ def work(begun, tmp_path):
 @pytest.fixture(scope="module")
 def truths(begun):
     """The truth of each frame by its stamp."""
-    with open_log(begun / "street.mcap", configure({})) as log:
-        return {each.stamp_ns: each.decode().truth for each in log.frames(log.select())}
+    return {frame.stamp_ns: frame.truth for frame in frames_in(begun / "street.mcap")}
 
 
 def label(folder, truths, only=None, form="png"):
     """Put true labels of picked frames where an annotator would put them."""
     picked = [e for e in Picks.read(folder).picked if only is None or e.why is only]
     values = np.array([0, 255], np.uint8)
-    proposals = [Proposal(f"{e.stamp_ns:019d}.png", truths[e.stamp_ns] == 1) for e in picked]
-    for each in proposals if form == "png" else ():
-        Image.fromarray(values[each.road.astype(int)]).save(folder / "labels" / each.image)
-    for name, content in as_coco(proposals).items() if form != "png" else ():
-        (folder / "labels" / name).write_bytes(content)
+    roads = {f"{e.stamp_ns:019d}.png": truths[e.stamp_ns] == 1 for e in picked}
+    for name, road in roads.items() if form == "png" else ():
+        Image.fromarray(values[road.astype(int)]).save(folder / "labels" / name)
+    if form != "png":
+        areas = {name: {"road": road} for name, road in roads.items()}
+        (folder / "labels" / "instances.json").write_text(coco_of(areas))
 
 
 def stamps_of(picks, why):

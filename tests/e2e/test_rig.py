@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterable
 from functools import cache
-from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -12,12 +11,9 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval.geometry.ground import ground_of
-from roadeval.geometry.settings import GroundSettings
-from roadeval.logs.log import open_log
-from roadeval.logs.writing.writer import LogWriter
 from tests.e2e.commands import DEMO, here
 from tests.e2e.test_fleet import Here
+from tests.fixtures.logged import frames_in, jpeg, write_drive
 from tests.recording.making import paths_of
 
 IMAGE, TRUTH = "/camera/image", "/truth/road"
@@ -30,11 +26,10 @@ TABLES = ("frames", "windows", "regions", "oracles", "changes", "heat", "disagre
 @cache
 def scenes() -> list[tuple[int, bytes, np.ndarray]]:
     """The demo's frames, a quarter as wide: stamp, JPEG and truth."""
-    with open_log(DEMO) as log:
-        frames = [frame.decode() for frame in islice(log.frames(log.select()), 69)]
+    frames = frames_in(DEMO, frames={"max_frames": 69})
     small = [(cv2.resize(each.image, SIZE), cv2.resize(each.truth, SIZE)) for each in frames]
     return [
-        (each.stamp_ns, cv2.imencode(".jpg", image[..., ::-1])[1].tobytes(), (truth == 1) * ROAD)
+        (each.stamp_ns, jpeg(image), (truth == 1) * ROAD)
         for each, (image, truth) in zip(frames, small, strict=True)
     ]
 
@@ -44,14 +39,13 @@ def a_rig(path: Path, cameras: dict[str, tuple[int, int]], without: Iterable[str
 
     Those of ``without`` have no labels.
     """
-    with LogWriter(path) as log:
-        for place, (stamp, image, truth) in enumerate(scenes()):
-            for name, (first, last) in cameras.items():
-                if first <= place < last:
-                    log.image(f"/{name}{IMAGE}", stamp, image, "jpeg")
-                    if name not in without:
-                        log.mask(f"/{name}{TRUTH}", stamp, truth)
-    return path
+
+    def messages(place, image, truth):
+        names = [name for name, (first, last) in cameras.items() if first <= place < last]
+        labels = {f"/{name}{TRUTH}": truth for name in names if name not in without}
+        return {f"/{name}{IMAGE}": image for name in names} | labels
+
+    return write_drive(path, ((s, messages(n, *rest)) for n, (s, *rest) in enumerate(scenes())))
 
 
 def topics(*cameras: str) -> list[str]:
@@ -226,11 +220,10 @@ def metres(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_errors_by_distance_are_those_of_the_pixels_there(metres: Path):
-    ground, _ = ground_of(None, GroundSettings(height=1.42, pitch=2.9, focal=(140.0,)), SIZE)
-    assert ground is not None
-    columns, rows = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
-    pixels = np.column_stack([columns.ravel(), rows.ravel()]).astype(float)
-    ahead = ground.places(pixels)[:, 0].reshape(SIZE[::-1])
+    """The camera is 1.42 m above the ground, pitched by 2.9 degrees, with a focal length of 140."""
+    pitch, y = np.radians(2.9), (np.arange(SIZE[1]) - (SIZE[1] - 1) / 2) / 140
+    down, forward = np.sin(pitch) + y * np.cos(pitch), np.cos(pitch) - y * np.sin(pitch)
+    ahead = np.where(down > 0, 1.42 * forward / down, np.nan)
     recording = roadeval.Recording(metres / "out.rrd")
     table = pd.read_csv(metres / "out" / "regions.csv")
     final = table[(table["variant"] == "filtered") & (table["stage"] == "post")]

@@ -1,5 +1,6 @@
 """Results side by side: which frames are compared, and what is said of them."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -7,11 +8,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from roadeval.evaluation.comparison.compare import ComparisonError, compare, variants_as_sides
-from roadeval.evaluation.comparison.conditions import Condition, judge
-from roadeval.evaluation.comparison.pairing import disagreements
+from roadeval.evaluation.comparison.compare import (
+    ComparisonError,
+    MaskChange,
+    compare,
+    variants_as_sides,
+)
+from roadeval.evaluation.comparison.conditions import Condition, ConditionError, judge
+from roadeval.evaluation.comparison.pairing import (
+    common_masks,
+    disagreements,
+    match_drives,
+    one_drive,
+    truth_differs,
+)
 from roadeval.evaluation.settings import EvaluationSettings
-from tests.evaluation.making import CAMERA, a_drive, a_result, a_side, altered, table_of
+from roadeval.evaluation.stats.difference import Difference
+from roadeval.evaluation.tables import concatenate
+from tests.evaluation.making import CAMERA, a_drive, a_result, a_side, a_table, altered, table_of
 from tests.evaluation.stats.test_difference import within
 
 SETTINGS = EvaluationSettings()
@@ -38,16 +52,23 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     )
 
 
-def test_different_drives_are_not_compared():
-    sides = [a_side("a", [10] * 20), a_side("b", [30] * 20, digest="d2")]
-    with pytest.raises(ComparisonError, match="a and b are of different drives"):
-        compare(sides, SETTINGS)
+LATE = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
+EMPTY = a_result("empty", a_drive({POST: []}))
 
 
-def test_a_result_that_does_not_know_its_log_is_not_compared():
-    sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
-    with pytest.raises(ComparisonError, match="b does not say which log it is of"):
-        compare(sides, SETTINGS)
+@pytest.mark.parametrize(
+    ("base", "new", "why"),
+    [
+        (a_side("a", [10]), a_side("b", [30], digest="d2"), "a and b are of different drives"),
+        (a_side("a", [10]), a_side("b", [10], digest=None), "b does not say which log it is of"),
+        (a_side("base", [10, 20]), LATE, "no evaluated frame and stage in common"),
+        (EMPTY, a_side("there", [10] * 12), "empty: nothing was scored"),
+        (a_side("there", [10] * 12), EMPTY, "empty: nothing was scored"),
+    ],
+)
+def test_results_without_a_frame_in_common_are_not_compared(base, new, why):
+    with pytest.raises(ComparisonError, match=why):
+        compare([base, new], SETTINGS)
 
 
 def test_settings_that_differ_are_named_with_both_values():
@@ -70,27 +91,24 @@ def test_settings_that_differ_are_named_with_both_values():
     )
 
 
-def test_a_change_between_scales_is_not_judged_but_a_level_is():
+@pytest.mark.parametrize(
+    ("scale", "other_truths", "reason"),
+    [
+        (0.5, 0, "base and new were replayed with `frames.scale` 1 and"),
+        (1.0, 2, "the truth differs on 2 frames"),
+    ],
+)
+def test_a_change_between_scales_or_truths_is_not_judged_but_a_level_is(
+    scale, other_truths, reason
+):
     base = a_side("base", [10] * 12, settings={"frames.scale": 1.0})
-    found = compare([base, a_side("new", [12] * 12, settings={"frames.scale": 0.5})], SETTINGS)
+    new = a_side("new", [12] * 12, settings={"frames.scale": scale})
+    new = altered(new, truth=lambda t: t + (np.arange(12) >= 12 - other_truths))
+    found = compare([base, new], SETTINGS)
     why = unjudged(found, "post.filtered.ERR > 1pp")
-    assert "not judged in new, because base and new were replayed with `frames.scale` 1 and" in why
+    assert f"not judged in new, because {reason}" in why
     (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)
     assert judged.holds
-
-
-def test_a_change_between_truths_is_not_judged_but_a_level_is():
-    base, new = a_side("base", [10] * 12), a_side("new", [12] * 12)
-    found = compare([base, altered(new, truth=lambda t: t + (np.arange(12) > 9))], SETTINGS)
-    assert "because the truth differs on 2 frames" in unjudged(found, "post.filtered.ERR > 1pp")
-    (judged,) = judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)
-    assert judged.holds
-
-
-def test_nothing_in_common_is_an_error():
-    late = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
-    with pytest.raises(ComparisonError, match="no evaluated frame and stage in common"):
-        compare([a_side("base", [10, 20]), late], SETTINGS)
 
 
 def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_same():
@@ -392,9 +410,222 @@ def test_several_cameras_of_a_drive_are_matched_each_with_its_own():
     assert change.difference["ERR"].unit == "frames"
 
 
-@pytest.mark.parametrize("place", [0, 1])
-def test_a_result_without_a_scored_frame_is_not_compared(place):
-    sides = [a_side("there", [10] * 12)]
-    sides.insert(place, a_result("empty", a_drive({POST: []})))
-    with pytest.raises(ComparisonError, match="empty: nothing was scored"):
-        compare(sides, SETTINGS)
+# --- Which drives of two results are the same, which masks and frames; and conditions on them -----
+
+
+def of_drives(label, *drives):
+    """A result of drives, each with its digest."""
+    return a_result(label, *(a_drive({("filtered", "post"): [1]}, *drive) for drive in drives))
+
+
+def pairs_of(found):
+    return [(one.drive, other.drive) for one, other in found[0]]
+
+
+@pytest.mark.parametrize(
+    ("base", "new", "pairs", "left"),
+    [
+        (  # by their names, else by their logs
+            [("a", "1"), ("b", "2"), ("c", "3")],
+            [("moved", "2"), ("a", "1"), ("other", "9")],
+            [("a", "a"), ("b", "moved")],
+            [
+                "1 drive is left out of base (not in new): c",
+                "1 drive is left out of new (not in base): other",
+            ],
+        ),
+        (  # a log that is in a result twice
+            [("a", "f"), ("b", "f"), ("c", "f")],
+            [("x", "f"), ("y", "f")],
+            [("a", "x"), ("b", "y")],
+            ["1 drive is left out of base (not in new): c"],
+        ),
+        (  # one name with two logs
+            [("a", "1")],
+            [("a", "2")],
+            [],
+            ["1 drive is left out of base (of another log in new): a"],
+        ),
+        (  # a result that does not say which log it is of
+            [("a", "1")],
+            [("a", None)],
+            [],
+            ["1 drive is left out of base (log unknown): a"],
+        ),
+    ],
+)
+def test_drives_of_one_name_and_log_are_one_and_all_others_are_told(base, new, pairs, left):
+    found = match_drives(of_drives("base", *base), of_drives("new", *new))
+    assert (pairs_of(found), found[1]) == (pairs, left)
+
+
+def test_one_drive_of_several_is_found_where_only_that_is_compared():
+    fleet, alone = of_drives("fleet", ("a", "1"), ("b", "2")), of_drives("alone", ("b", "2"))
+    found = one_drive([fleet, alone])
+    assert [side.drives[0].drive for side in found] == ["b", "b"]
+    assert one_drive([fleet, fleet]) is None
+    assert one_drive([fleet, of_drives("other", ("c", "3"))]) is None
+
+
+def masks_of(base, new):
+    found = common_masks(a_table(base), a_table(new))
+    names = ["variant", "stage_base", "stage", "final"]
+    return [*found[names].drop_duplicates().itertuples(index=False, name=None)]
+
+
+def test_final_masks_are_matched_whatever_their_stages_are_called():
+    longer = {("a", "svm"): [1], ("a", "smooth"): [1]}
+    assert masks_of({("a", "svm"): [1]}, longer) == [("a", "svm", "smooth", True)]
+    assert masks_of(longer, {("a", "svm"): [1]}) == [("a", "smooth", "svm", True)]
+    both = {("a", "svm"): [1], ("a", "post"): [1], ("b", "post"): [1]}
+    assert masks_of(both, both) == [
+        ("a", "svm", "svm", False),
+        ("a", "post", "post", True),
+        ("b", "post", "post", True),
+    ]
+
+
+def test_frames_are_matched_by_stamp_and_equal_stamps_in_their_order():
+    base, new = (a_table({("a", "post"): [*range(5)]}) for _ in range(2))
+    stamps = base.assign(stamp_ns=[9, 5, 7, 7, 1]), new.assign(stamp_ns=[7, 9, 7, 7, 2])
+    found = common_masks(*stamps)
+    assert found[["frame_base", "frame"]].to_numpy().tolist() == [[0, 1], [2, 0], [3, 2]]
+
+
+def test_of_several_drives_each_is_matched_with_its_own():
+    one, other = (a_table({("a", "post"): [1, 2]}, drive=name) for name in ("one", "other"))
+    found = common_masks(concatenate([one, other]), concatenate([other, one]))
+    assert found["drive"].tolist() == ["one", "one", "other", "other"]
+    assert (found["frame"] == found["frame_base"]).all()
+
+
+def test_nothing_has_nothing_in_common():
+    assert len(common_masks(table_of("frames", []), a_table({("a", "post"): [1]}))) == 0
+    assert truth_differs(table_of("frames", []), a_table({("a", "post"): [1]})) == 0
+
+
+def rows_with(*truths, first=0):
+    """Rows of two masks a frame, each frame with the checksum of its truth."""
+    table = a_table({("a", "svm"): [1] * len(truths), ("a", "post"): [1] * len(truths)})
+    return table.assign(truth=np.repeat(truths, 2), frame=table["frame"] + first)
+
+
+@pytest.mark.parametrize(
+    ("base", "new", "frames"),
+    [
+        (rows_with(7, 8, 9), rows_with(7, 8, 9, 1, first=5), 0),
+        (rows_with(7, 8, 9), rows_with(7, 5, 6, 1), 2),
+        (rows_with(7, 0, 9), rows_with(0, 5, 9), 0),  # results before 0.3 know no checksum
+    ],
+)
+def test_another_truth_is_noticed_by_its_checksum_on_the_frames_that_both_have(base, new, frames):
+    assert truth_differs(base, new) == frames
+
+
+MASK = MaskChange(
+    result="new",
+    variant="filtered",
+    stage="post",
+    final=True,
+    drives=1,
+    frames=12,
+    base={"ERR": 0.100, "IoU": 0.8},
+    new={"ERR": 0.106, "IoU": 0.7, "pooled_IoU": 0.7, "FNR": math.nan},
+    difference={},
+)
+
+
+def a_mask(low, high):
+    """A mask whose ERR rose by 0.6 points, with this interval in points."""
+    ends = (None, None) if low is None else (low / 100, high / 100)
+    needed = 20 if low is None else None
+    change = Difference(0.006, *ends, None, 0.95, "frames", 12, needed=needed)
+    return replace(MASK, difference={"ERR": change})
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("post.filtered.ERR > +0.5pp", ("post", "filtered", "ERR", ">", 0.5, True)),
+        ("  svm.my-net_2.pooled_FNR<= 20 % ", ("svm", "my-net_2", "pooled_FNR", "<=", 20, False)),
+    ],
+)
+def test_a_change_is_in_percentage_points_and_a_level_in_percent(text, parts):
+    c = Condition.parse(text)
+    assert (c.stage, c.variant, c.rate, c.operator, c.limit, c.is_change) == parts
+
+
+EXAMPLE = r"as 'post\.filtered\.ERR > \+0\.5pp'"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        *((text, EXAMPLE) for text in ("", "filtered.ERR > 1pp", "surely post.filtered.ERR > 1pp")),
+        *(
+            (f"post.filtered.ERR {text}", EXAMPLE)
+            for text in (
+                *("> 0.5", ">> 0.5pp", "== 0pp", "> 1e3pp", "> nan%", "> 1pp or True"),
+                *("> 1ppsurely", "> 1pp surely surely"),
+            )
+        ),
+        ("__import__('os').system('true') > 1pp", EXAMPLE),
+        ("post.filtered.EER > 1pp", "no rate EER; there are ACC, ERR"),
+        ("post.filtered.ERR > 20% surely", r"a level \(%\) has none"),
+        ("post.filtered.pooled_ERR > 1pp surely", "pooled_ERR has no interval"),
+        ("post.filtered.IoU < -1pp surely", "has no interval; 'surely' goes with ACC, ERR"),
+        ("post.filtered.TPR < -1pp surely", "has no interval; 'surely' goes with ACC, ERR"),
+    ],
+)
+def test_anything_else_is_refused_with_an_example_or_the_reason(text, why):
+    with pytest.raises(ConditionError, match=why):
+        Condition.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("post.filtered.ERR > +0.5pp", True),
+        ("post.filtered.ERR > 0.7pp", False),
+        ("post.filtered.ERR < -0.1pp", False),
+        ("post.filtered.ERR >= 10%", True),
+        ("post.filtered.ERR > 11%", False),
+        ("post.filtered.IoU < 75%", True),
+        ("post.filtered.pooled_IoU < 75%", True),
+        ("post.filtered.IoU < -9.9pp", True),
+    ],
+)
+def test_a_condition_holds_or_not(text, holds):
+    assert Condition.parse(text).judge(MASK).holds is holds
+
+
+@pytest.mark.parametrize(
+    ("limit", "interval", "holds"),
+    [
+        ("> +0.5pp", (0.51, 0.7), True),
+        ("> +0.5pp", (0.5, 0.7), False),
+        (">= +0.5pp", (0.5, 0.7), True),
+        ("> +0.5pp", (0.49, 9.0), False),
+        ("< -0.5pp", (-0.7, -0.51), True),
+        ("< -0.5pp", (-0.7, -0.5), False),
+        ("<= -0.5pp", (-0.7, -0.5), True),
+        ("< -0.5pp", (-9.0, -0.49), False),
+        ("> -1pp", (-0.9, 0.3), True),
+    ],
+)
+def test_what_is_surely_so_is_so_of_the_whole_interval(limit, interval, holds):
+    condition = Condition.parse(f"post.filtered.ERR {limit} surely")
+    assert condition.surely
+    assert condition.judge(a_mask(*interval)).holds is holds
+
+
+def test_certainty_without_an_interval_is_not_judged():
+    condition = Condition.parse("post.filtered.ERR > -1pp surely")
+    found = condition.judge(a_mask(None, None))
+    assert found.holds is None
+    assert "not judged in new, because 12 frames are too few for an interval" in found.why
+
+
+def test_what_is_undefined_is_not_judged_as_passed():
+    found = Condition.parse("post.filtered.FNR > 5%").judge(MASK)
+    assert (found.holds, "undefined in new" in found.why) == (None, True)

@@ -8,10 +8,9 @@ from pathlib import Path
 from roadeval.jobs.outputs import Outputs
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.folder import CONTENT, ResultsWriter
-from roadeval.runtime.files import NewFile
+from roadeval.runtime.files import NewFile, claim_folder
 from tests.results.making import facts_of
 
-__all__ = ["CONTENT"]
 PLACES = ("out.rrd", "out.mcap", "reports")
 
 
@@ -22,6 +21,12 @@ def recorder(path: Path):
     file.begin()
     yield file.partial
     file.publish()
+
+
+def recover(place: Path) -> None:
+    """Claim the results folder, as the next command does: what was left half done is put right."""
+    with claim_folder(place / "reports", CONTENT) as certain:
+        assert certain
 
 
 def run(place: Path, name: str) -> None:

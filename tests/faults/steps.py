@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, Final
 
-from roadeval.errors import RoadevalError
+from roadeval import RoadevalError
 
 ADDING: Final = ("os.mkdir", "os.link", "os.rename")
 """Steps for which a disk may lack room."""

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 import roadeval
-from roadeval.runtime.files import claim_folder
 from tests.e2e.test_fleet import Here, tables, write
 from tests.faults import making, steps
 from tests.faults.forking import Forks
@@ -72,11 +71,6 @@ def notes(place):
     return {path: (place / path).read_text() for path in paths if path.parts[0][0] != "."}
 
 
-def recover(place):
-    with claim_folder(place / "reports", making.CONTENT) as certain:
-        assert certain
-
-
 def check_next_run(place, before, whole):
     """The next run writes its own outputs, and leaves nothing of the one that was killed."""
     making.run(place, "next")
@@ -103,7 +97,7 @@ def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
         if found["reports"] not in (old["reports"], new["reports"]):
             assert "summary.json" not in found["reports"]
             moving += 1
-            recover(place)
+            making.recover(place)
             assert making.outputs(place)["reports"] == new["reports"]
         assert notes(place) == notes(tmp_path / "model")
         check_next_run(place, tmp_path / "model", after)
@@ -124,7 +118,7 @@ def test_a_disk_that_is_full_from_any_step_on_costs_no_earlier_result(
         found = making.outputs(place)
         if found["reports"] not in (old["reports"], new["reports"]):
             assert "summary.json" not in found["reports"]
-            recover(place)
+            making.recover(place)
             assert making.outputs(place)["reports"] == new["reports"]
         elif code == steps.FAILED and found["reports"] == old["reports"]:
             # They take their names together, the folder first.

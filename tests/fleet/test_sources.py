@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config.run import RunConfig, configure
+from roadeval import RoadevalError, RunConfig, configure
 from roadeval.data import is_plain
-from roadeval.errors import RoadevalError
 from roadeval.fleet.drives import (
     DriveEntry,
     FleetError,

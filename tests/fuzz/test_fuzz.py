@@ -6,7 +6,7 @@ from time import monotonic
 
 import pytest
 
-from roadeval.errors import RoadevalError
+from roadeval import RoadevalError
 from tests.fuzz import campaign, harness
 from tests.fuzz.campaign import Job, case_of
 from tests.fuzz.harness import NAMES, Harness, Lost, harness_of, run_case

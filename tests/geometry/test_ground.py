@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.world.camera import Camera, Pose
-from roadeval.config.run import configure
+from roadeval import configure
 from roadeval.config.tables import ConfigError
 from roadeval.data import Calibration, Mounting
 from roadeval.geometry.ground import Ground, GroundError, ground_of

@@ -1,14 +1,16 @@
 """Small logs and short ways to say how they are replayed."""
 
+import importlib
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 
 from roadeval import RunConfig, configure
-from roadeval.logs.writing.writer import LogWriter
+from roadeval.pipeline.stages import import_stage
+from tests.fixtures.logged import write_drive
 from tests.training.making import frame
 
 FRAMES: Final = 26
@@ -41,6 +43,14 @@ def settings(**values: Any) -> RunConfig:
     return configure(tables)
 
 
+def write_module(path: Path, text: str) -> None:
+    """Write a module with stages in place of the one of its name that was imported before."""
+    import_stage.cache_clear()
+    sys.modules.pop(path.stem, None)
+    path.write_text(text)
+    importlib.invalidate_caches()
+
+
 def write_log(
     path: Path,
     *,
@@ -55,17 +65,16 @@ def write_log(
     ``codes`` are the values of non-road and road in the truth, and ``numbers`` the frames
     that are written.
     """
-    with LogWriter(path) as writer:
-        for number in numbers:
-            made, stamp = frame(number), (number + 1) * NS
-            # The verge creeps over the road, so that no fixed mask is right everywhere.
-            made.image[12 : 12 + number // 8] = made.image[0]
-            made.truth[12 : 12 + number // 8] = 0
-            _, png = cv2.imencode(".png", made.image[..., ::-1])
-            data = b"no image" if number == broken else png.tobytes()
-            writer.image("/camera/image", stamp, data, "png")
-            if truth and number != 20:
-                writer.mask("/truth/road", stamp, np.array(codes, np.uint8)[made.truth])
-            if net:
-                writer.mask("/net/road_mask_prediction", stamp, made.truth * 255)
-    return path
+
+    def messages(number: int) -> dict[str, Any]:
+        made = frame(number)
+        # The verge creeps over the road, so that no fixed mask is right everywhere.
+        made.image[12 : 12 + number // 8] = made.image[0]
+        made.truth[12 : 12 + number // 8] = 0
+        return {
+            "/camera/image": b"no image" if number == broken else made.image,
+            "/truth/road": np.uint8(codes)[made.truth] if truth and number != 20 else None,
+            "/net/road_mask_prediction": made.truth * 255 if net else None,
+        }
+
+    return write_drive(path, (((number + 1) * NS, messages(number)) for number in numbers))

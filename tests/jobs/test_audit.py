@@ -12,11 +12,11 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError, RunConfig
-from roadeval.cli.app import main
-from roadeval.jobs.results.audit import Audit
-from roadeval.logs.log import describe
-from roadeval.logs.writing.writer import LogWriter
-from tests.evaluation.test_label_errors import FRAMES, image_at, method_at, road_at, wrong_labels
+from tests.e2e.commands import here
+from tests.evaluation.test_fit import LABELS as FRAMES
+from tests.evaluation.test_fit import image_at, method_at, wrong_labels
+from tests.evaluation.test_fit import road_ahead as road_at
+from tests.fixtures.logged import coco_of, write_drive
 from tests.jobs.making import settings, write_log
 
 NS = 100_000_000
@@ -49,15 +49,17 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     base = tmp_path_factory.mktemp("audit")
     for name in ("mine", "b"):
         (base / name).mkdir()
-    with LogWriter(base / "drive.mcap") as log:
-        for frame in range(FRAMES):
-            png = cv2.imencode(".png", image_at(frame))[1].tobytes()
-            log.image("/camera", stamp_of(frame), png, "png")
-            log.mask("/truth/road", stamp_of(frame), label_of(frame, is_wrong=True))
-            second = road_at(frame)
-            second[70:, :40] = 0
-            for name, mask in (("mine", method_at(frame)), ("b", second)):
-                cv2.imwrite(str(base / name / f"{stamp_of(frame):019d}.png"), mask * 255)
+    for frame in range(FRAMES):
+        second = road_at(frame)
+        second[70:, :40] = 0
+        for name, mask in (("mine", method_at(frame)), ("b", second)):
+            cv2.imwrite(str(base / name / f"{stamp_of(frame):019d}.png"), mask * 255)
+    labels = {frame: label_of(frame, is_wrong=True) for frame in range(FRAMES)}
+    images = {frame: image_at(frame)[..., ::-1] for frame in labels}
+    write_drive(
+        base / "drive.mcap",
+        ((stamp_of(f), {"/camera": images[f], "/truth/road": labels[f]}) for f in labels),
+    )
     config = with_masks(base, "mine", "b").override(CODES)
     save, reports = base / "drive.rrd", base / "reports"
     roadeval.replay(base / "drive.mcap", config, save=save, reports=reports)
@@ -65,7 +67,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module", params=["png", "coco"])
-def audited(request: pytest.FixtureRequest, place: Path) -> tuple[Audit, Path]:
+def audited(request: pytest.FixtureRequest, place: Path):
     folder = place / request.param
     found = roadeval.audit(
         place / "drive.rrd", folder=folder, labels=request.param, annotators=["b"]
@@ -95,13 +97,11 @@ def correct(folder: Path, frames: list[int]) -> None:
             levels = np.select([label_of(frame) == 3, label_of(frame) == 11], [255, 128])
             cv2.imwrite(str(folder / "labels" / f"{stamp_of(frame):019d}.png"), levels)
         return
-    from roadeval.logs.truth.formats.coco import as_coco
-    from roadeval.logs.truth.shapes import Proposal
-
-    right = [
-        Proposal(f"{stamp_of(f):019d}.png", label_of(f) == 3, label_of(f) == 11) for f in frames
-    ]
-    merged, other = (json.loads(as_coco(right)["instances.json"]), json.loads(coco.read_text()))
+    areas = {f: {"road": label_of(f) == 3, "ignore": label_of(f) == 11} for f in frames}
+    right = coco_of({f"{stamp_of(f):019d}.png": classes for f, classes in areas.items()})
+    merged, other = json.loads(right), json.loads(coco.read_text())
+    for entry in other["annotations"]:
+        entry["category_id"] -= 1  # its classes begin at 1
     names = {image["file_name"] for image in merged["images"]}
     rest = {i["id"]: i for i in other["images"] if i["file_name"] not in names}
     for kind, kept in (
@@ -114,9 +114,7 @@ def correct(folder: Path, frames: list[int]) -> None:
     (folder / "labels" / "instances.json").write_text(json.dumps(merged))
 
 
-def test_the_wrong_labels_are_written_with_pictures_and_the_line_to_tell(
-    audited: tuple[Audit, Path],
-) -> None:
+def test_the_wrong_labels_are_written_with_pictures_and_the_line_to_tell(audited) -> None:
     found, folder = audited
     clear = found.suspects.query("clear").frame.tolist()
     assert sorted(clear) == [*wrong_labels()]
@@ -130,14 +128,14 @@ def test_the_wrong_labels_are_written_with_pictures_and_the_line_to_tell(
     assert images == {f"{row['stamp_ns']:019d}.png" for row in table}
 
 
-def test_how_far_two_people_differ_is_told(audited: tuple[Audit, Path]) -> None:
+def test_how_far_two_people_differ_is_told(audited) -> None:
     said = audited[0].sentences[-1]
     assert said.startswith("b and the truth differ on ")
     assert said.endswith("differences of ERR below that mean nothing.")
 
 
 def test_corrected_labels_change_these_frames_and_no_others(
-    audited: tuple[Audit, Path], place: Path, tmp_path: Path
+    audited, place: Path, tmp_path: Path
 ) -> None:
     _, folder = audited
     correct(folder, [3, 7])
@@ -152,7 +150,7 @@ def test_corrected_labels_change_these_frames_and_no_others(
 def test_an_audit_without_a_corrected_label_is_no_truth(place: Path, tmp_path: Path) -> None:
     roadeval.audit(place / "drive.rrd", folder=tmp_path / "new")
     config = settings().override({"truth": {"path": str(tmp_path / "new")}})
-    assert "no label in it yet" in describe(place / "drive.mcap", config).problem
+    assert "no label in it yet" in roadeval.info(place / "drive.mcap", config).problem
 
 
 def test_audits_that_correct_each_other_are_damaged(place: Path, tmp_path: Path) -> None:
@@ -163,19 +161,7 @@ def test_audits_that_correct_each_other_are_damaged(place: Path, tmp_path: Path)
         about["run"]["topics"]["truth"] = None
         (tmp_path / folder / "audit.json").write_text(json.dumps(about))
     config = settings().override({"truth": {"path": str(tmp_path / "a")}})
-    assert "not as roadeval audit writes it" in describe(place / "drive.mcap", config).problem
-
-
-def test_a_folder_with_something_else_is_not_overwritten(place: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").touch()
-    with pytest.raises(RoadevalError, match="is not empty"):
-        roadeval.audit(place / "drive.rrd", folder=tmp_path)
-
-
-def test_a_fleet_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "fleet.json").write_text("{}")
-    with pytest.raises(RoadevalError, match="a fleet: audit its drives one by one"):
-        roadeval.audit(tmp_path)
+    assert "not as roadeval audit writes it" in roadeval.info(place / "drive.mcap", config).problem
 
 
 def test_labels_to_correct_of_reduced_frames_are_refused_before_the_replay(
@@ -187,17 +173,25 @@ def test_labels_to_correct_of_reduced_frames_are_refused_before_the_replay(
     assert not (tmp_path / "x").exists()
 
 
-def test_an_annotator_without_masks_is_refused(place: Path) -> None:
+def test_a_fleet_an_annotator_without_masks_and_a_folder_with_something_else_are_refused(
+    place: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "fleet.json").write_text("{}")
+    with pytest.raises(RoadevalError, match="a fleet: audit its drives one by one"):
+        roadeval.audit(tmp_path)
     with pytest.raises(RoadevalError, match="no masks of c"):
         roadeval.audit(place / "drive.rrd", annotators=["c"])
+    with pytest.raises(RoadevalError, match="is not empty"):
+        roadeval.audit(place / "drive.rrd", folder=tmp_path)
 
 
 @pytest.mark.parametrize("words", [[], ["--preset", "gated"]])
 def test_a_log_is_audited_with_the_preset_that_errs_least_or_the_chosen_one(
     place: Path, tmp_path: Path, words: list[str]
 ) -> None:
-    log, truth = place / "drive.mcap", ["--road-label", "3", "--ignore-label", "11"]
-    assert main(["audit", str(log), *truth, *words, "-o", str(tmp_path / "x"), "--quiet"]) == 0
+    truth = ["--road-label", "3", "--ignore-label", "11"]
+    run = here("audit", place / "drive.mcap", *truth, *words, "-o", tmp_path / "x", "--quiet")
+    assert run.returncode == 0
     assert roadeval.load_config(tmp_path / "x" / "run.toml").preset == (words or ["robust"])[-1]
 
 
@@ -206,15 +200,15 @@ def test_from_python_it_is_the_same_preset(tmp_path: Path) -> None:
     assert roadeval.load_config(tmp_path / "x" / "run.toml").preset == "robust"
 
 
-def test_the_command_shows_what_is_wrong_and_what_to_type_next(
-    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["audit", str(place / "drive.rrd"), "-n", "3", "-o", str(tmp_path / "x")]) == 0
-    shown = capsys.readouterr().out
-    assert shown.startswith("The labels of 3 frames look wrong: ")
-    assert "left and right are exchanged" in shown
-    assert f"--config {place / 'drive.rrd'} --truth {tmp_path / 'x'}" in shown
-    assert main(["audit", str(place / "drive.rrd"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["suspects"][0]["clear"] is True
-    assert main(["audit", str(place / "drive.rrd"), "--truth", str(place / "mine")]) == 2
-    assert "a result has its truth and masks; give the log" in capsys.readouterr().err
+def test_the_command_shows_what_is_wrong_and_what_to_type_next(place: Path, tmp_path: Path) -> None:
+    result = place / "drive.rrd"
+    run = here("audit", result, "-n", 3, "-o", tmp_path / "x")
+    assert run.returncode == 0
+    assert run.stdout.startswith("The labels of 3 frames look wrong: ")
+    assert "left and right are exchanged" in run.stdout
+    assert f"--config {result} --truth {tmp_path / 'x'}" in run.stdout
+    run = here("audit", result, "--json")
+    assert (run.returncode, json.loads(run.stdout)["suspects"][0]["clear"]) == (0, True)
+    run = here("audit", result, "--truth", place / "mine")
+    assert run.returncode == 2
+    assert "a result has its truth and masks; give the log" in run.stderr

@@ -4,7 +4,6 @@ import re
 import shutil
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,9 +12,9 @@ from mcap_ros2.decoder import DecoderFactory
 
 from roadeval import Result, replay, replay_fleet, write_report
 from roadeval.evaluation.tables import by_class, only
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.results.why import describe_classes
 from tests.e2e.test_fleet import Here
+from tests.fixtures.logged import write_drive
 from tests.fixtures.shared import shared
 from tests.jobs.making import NS, settings
 from tests.training.making import frame
@@ -73,15 +72,15 @@ def test_a_drive_of_plain_masks_has_no_table_of_classes(drive: Path, tmp_path):
 
 def write_ids(path: Path, width: int) -> None:
     """Write a drive with the ids of road (3), verge (4) and car (8), of so many columns."""
-    with LogWriter(path) as writer:
-        for number in range(14):
-            made, stamp = frame(number + width), (number + 1) * NS
-            labels = np.where(made.truth == 1, 3, 4).astype(np.uint8)
-            labels[:12, :width] = 8
-            made.image[8:12] = made.image[20:]  # the verge's last rows look like road
-            _, png = cv2.imencode(".png", made.image[..., ::-1])
-            writer.image("/camera/image", stamp, png.tobytes(), "png")
-            writer.mask("/labels", stamp, labels)
+
+    def messages(number):
+        made = frame(number + width)
+        labels = np.where(made.truth == 1, 3, 4).astype(np.uint8)
+        labels[:12, :width] = 8
+        made.image[8:12] = made.image[20:]  # the verge's last rows look like road
+        return {"/camera/image": made.image, "/labels": labels}
+
+    write_drive(path, (((number + 1) * NS, messages(number)) for number in range(14)))
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.cli.app import main
 from roadeval.data import ERRORS, ROAD
 from roadeval.data.arrays import FN, FP, TN, TP
 from roadeval.jobs.results import clip as job
 from roadeval.report.images import DARKEN
+from tests.e2e.commands import here
 from tests.logs.making import SECOND, compressed, jpeg, raw, ros2_log
 
 WIDTH, HEIGHT, FRAMES = 96, 60, 30
@@ -138,10 +138,10 @@ def test_of_a_slow_drive_a_few_frames_are_shown_twice_a_second(tmp_path, monkeyp
     assert (rate, len(pictures), {*told}) == (2, 4, {"s, 10.0 x speed"})
 
 
-def test_a_results_folder_stands_for_its_recording(recording, tmp_path, capsys):
+def test_a_results_folder_stands_for_its_recording(recording, tmp_path):
     film = tmp_path / "a.mp4"
-    assert main(["clip", str(recording.with_suffix("")), "--frames", "3:4", "-o", str(film)]) == 0
-    assert capsys.readouterr().out == f"{film}\n"
+    run = here("clip", recording.with_suffix(""), "--frames", "3:4", "-o", film)
+    assert (run.returncode, run.stdout) == (0, f"{film}\n")
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
 
 
@@ -157,12 +157,12 @@ def test_a_results_folder_stands_for_its_recording(recording, tmp_path, capsys):
         (("-o", "{drive}.rrd/x"), 1, "drive.rrd"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(recording, capsys, words, code, sentence):
+def test_what_is_wrong_is_told_in_one_line(recording, words, code, sentence):
     there = str(recording.with_suffix(""))
-    assert main(["clip", str(recording), *(w.format(drive=there) for w in words)]) == code
-    error = capsys.readouterr().err
-    assert sentence in error
-    assert error.count("\n") == 1
+    run = here("clip", recording, *(w.format(drive=there) for w in words))
+    assert run.returncode == code
+    assert sentence in run.stderr
+    assert run.stderr.count("\n") == 1
 
 
 def test_a_clip_that_fails_leaves_nothing(recording, tmp_path, monkeypatch):
@@ -189,7 +189,9 @@ def test_drives_of_a_fleet_with_one_name_have_clips_of_their_own(recording, tmp_
 # --- The log's own messages -----------------------------------------------------------------------
 
 
-def test_the_messages_of_a_clip_replay_to_the_same_truth(recording, tmp_path):
+def test_the_messages_of_a_clip_replay_to_the_same_truth_and_never_replace_their_log(
+    recording, tmp_path
+):
     (film,), losses = roadeval.clip(recording, tmp_path / "f.mp4", frames=range(24, 28), mcap=True)
     assert (film.name, losses) == ("f.mp4", [])
     part = roadeval.Recording(replayed(film.with_suffix(".mcap"))).frames
@@ -197,9 +199,6 @@ def test_the_messages_of_a_clip_replay_to_the_same_truth(recording, tmp_path):
     before = roadeval.Recording(recording).frames.query("4 <= frame < 28")
     assert part["stamp_ns"].tolist() == before["stamp_ns"].tolist()
     assert part[numbers].to_numpy().tolist() == before[numbers].to_numpy().tolist()
-
-
-def test_the_messages_of_a_clip_do_not_take_the_place_of_their_log(recording):
     log = recording.with_suffix(".mcap")
     content = log.read_bytes()
     with pytest.raises(RoadevalError, match=r"drive.mcap: is an input or another output"):
@@ -207,19 +206,17 @@ def test_the_messages_of_a_clip_do_not_take_the_place_of_their_log(recording):
     assert log.read_bytes() == content
 
 
-def test_of_a_damaged_log_the_readable_part_is_written(tmp_path, capsys):
+def test_of_a_damaged_log_the_readable_part_is_written(tmp_path):
     log = write_drive(tmp_path / "cut.mcap")
     content = log.read_bytes()
     log.write_bytes(content[: len(content) * 4 // 5])
-    places = "--save", str(tmp_path / "cut.rrd"), "--reports", str(tmp_path / "cut")
+    places = "--save", tmp_path / "cut.rrd", "--reports", tmp_path / "cut"
     topics = "--image-topic", "/camera", "--truth-topic", "/labels", "--mask-topic", "a=/a"
-    assert main(["replay", str(log), *places, *topics, "--only", "a", "-q"]) == 3
-    capsys.readouterr()
+    assert here("replay", log, *places, *topics, "--only", "a", "-q").returncode == 3
     film = tmp_path / "film.mp4"
-    assert main(["clip", str(tmp_path / "cut.rrd"), "-o", str(film), "--mcap"]) == 3
-    shown = capsys.readouterr()
-    assert "roadeval: lost: cut.mcap: " in shown.err
-    assert shown.out == f"{film}, {film.with_suffix('.mcap')}\n"
+    run = here("clip", tmp_path / "cut.rrd", "-o", film, "--mcap")
+    assert (run.returncode, run.stdout) == (3, f"{film}, {film.with_suffix('.mcap')}\n")
+    assert "roadeval: lost: cut.mcap: " in run.stderr
     assert not roadeval.info(film.with_suffix(".mcap")).losses
 
 

@@ -1,9 +1,7 @@
 """Results compared, and opened as one: from fleets' folders and from what single drives left."""
 
-import importlib
 import re
 import shutil
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
@@ -13,12 +11,9 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval import compare, replay, replay_fleet
-from roadeval.errors import RoadevalError
-from roadeval.pipeline import stages
-from roadeval.results.fleet import FleetFolder, cached_path
+from roadeval import RoadevalError, compare, replay, replay_fleet
 from tests.e2e.test_fleet import Here
-from tests.jobs.making import FRAMES, PIXELS, settings, write_log
+from tests.jobs.making import FRAMES, PIXELS, settings, write_log, write_module
 from tests.results.fleet.making import fleet_of
 from tests.training.making import frame
 
@@ -63,11 +58,8 @@ def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     drive = write_log(tmp_path / "drive.mcap")
     for name, least in (("base", 100), ("new", 120)):
-        stages.import_stage.cache_clear()
-        sys.modules.pop("greyroad", None)
         code = f"def road(image):\n    return image.mean(axis=2) > {least}\n"
-        (tmp_path / "greyroad.py").write_text(code)
-        importlib.invalidate_caches()
+        write_module(tmp_path / "greyroad.py", code)
         config = settings(variants={"grey": {"chain": ["greyroad:road", "post"]}}, only=["grey"])
         replay(drive, config, save=tmp_path / f"{name}.rrd", reports=tmp_path / name)
         replay_fleet([drive], tmp_path / f"fleet_{name}", config, executor=Here())
@@ -120,7 +112,7 @@ def test_labels_that_moved_are_told_and_no_change_is_judged(unmoved, tmp_path, m
 
 def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):
     cut = shutil.copytree(fleets[1], tmp_path / "cut")
-    path = cached_path(cut, "frames", FleetFolder(cut).facts.drives[0].drive)
+    path = min((cut / "frames").glob("drive_0000*/frames.parquet"))
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RoadevalError, match=r"frames\.parquet: damaged"):
         compare([fleets[0], cut])

@@ -6,13 +6,13 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.cli.app import main
 from roadeval.data import BASELINE
 from roadeval.jobs.results.inspect import worst_frames
 from roadeval.jobs.results.report import findings_of
 from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 from roadeval.results.verdict import verdict_on, verdicts
+from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here, write
 from tests.jobs.making import settings, write_log
 
@@ -118,11 +118,11 @@ def test_the_table_and_the_worst_frames_of_a_fleet_are_those_of_the_focus(tmp_pa
         (["--masks", "mine=folder", "--variant", "wide=robust", "--focus", "wide"], "wide"),
     ],
 )
-def test_the_first_variant_that_was_typed_is_the_focus(words, focus, capsys):
+def test_the_first_variant_that_was_typed_is_the_focus(words, focus):
     """By themselves computed variants come before masks."""
-    assert main(["config", *words, *(["--preset", "paper"])]) == 0
-    shown = capsys.readouterr().out
-    assert (f'focus = "{focus}"' if focus else "# focus =") in shown
+    run = here("config", *words, "--preset", "paper")
+    assert run.returncode == 0
+    assert (f'focus = "{focus}"' if focus else "# focus =") in run.stdout
 
 
 def test_a_preset_without_a_filter_is_a_variant_of_its_name(drive, tmp_path):

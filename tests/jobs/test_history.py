@@ -8,10 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from roadeval import compare
-from roadeval.errors import RoadevalError
-from roadeval.jobs.results.history import find_results, history, write
-from roadeval.jobs.results.result import Result
+from roadeval import Result, RoadevalError, compare, history
+from roadeval.jobs.results.history import find_results, write
 from roadeval.report.blocks import Figure, Heading
 from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict

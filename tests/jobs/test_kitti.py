@@ -16,6 +16,7 @@ from roadeval import RoadevalError
 from roadeval.logs.log import open_log
 from roadeval.report.sections.ground import kitti_table
 from roadeval.results.facts import Facts
+from tests.fixtures.logged import frames_in
 from tests.jobs.making import settings
 
 P2 = (721.5377, 0, 609.5593, 44.85728, 0, 721.5377, 172.854, 0.2163791, 0, 0, 1, 0.002745884)
@@ -130,8 +131,7 @@ def outcome(kitti: Path) -> roadeval.Outcome:
 
 
 def test_a_folder_becomes_a_log_with_a_calibration_a_frame(kitti: Path, outcome: object) -> None:
-    with open_log(kitti / "kitti.mcap") as log:
-        frames = [logged.decode() for logged in log.frames(log.select())]
+    frames = frames_in(kitti / "kitti.mcap")
     assert {frame.name: frame.image.shape[1::-1] for frame in frames} == NAMES
     truth = cv2.imread(str(kitti / "training/gt_image_2/uu_road_000007.png"))
     expected = np.where(truth[..., 2] > 0, truth[..., 0] > 0, 255)

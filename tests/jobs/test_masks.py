@@ -11,12 +11,11 @@ import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.run.prepared import identity
 from roadeval.logs.log import open_log
-from roadeval.logs.settings import LogConfig, TopicSettings
-from roadeval.logs.writing.writer import LogWriter
+from tests.fixtures.logged import frames_in, write_drive
 from tests.jobs.making import FRAMES, settings, write_log
 
 IN_LOG = "/net/road_mask_prediction"
-WITH_MASKS = LogConfig(topics=TopicSettings(masks={"net": IN_LOG}))
+WITH_MASKS = {"topics": {"masks": {"net": IN_LOG}}}
 
 
 @pytest.fixture(scope="module")
@@ -27,14 +26,16 @@ def places(tmp_path_factory) -> Path:
     kinds = ("number", "stamp", "npy", "classes", "confidence", "images", "named", "half")
     for kind in kinds:
         (base / kind).mkdir()
-    with open_log(drive, WITH_MASKS) as log, LogWriter(base / "other.mcap") as other:
-        selection = log.select()
-        for frame in (logged.decode() for logged in log.frames(selection)):
-            # Wrong somewhere, and elsewhere in each frame.
-            mask = np.roll(frame.external["net"], frame.number % 5 - 2, 0)
-            _write(base, frame.number, frame.stamp_ns, mask)
-            other.mask("/seg", frame.stamp_ns, mask, log_time_ns=frame.stamp_ns + 5)
+    frames = frames_in(drive, **WITH_MASKS)
+    for frame in frames:
+        _write(base, frame.number, frame.stamp_ns, rolled(frame))
+    write_drive(base / "other.mcap", ((f.stamp_ns, {"/seg": rolled(f)}) for f in frames))
     return base
+
+
+def rolled(frame):
+    """A mask that is wrong somewhere, and elsewhere in each frame."""
+    return np.roll(frame.external["net"], frame.number % 5 - 2, 0)
 
 
 def _write(base, number, stamp, mask):
@@ -64,15 +65,17 @@ def masks(base, **tables):
 def outcome(places, tmp_path_factory):
     """A replay with the masks of all places side by side; with those in the log, rolled alike."""
     inside = tmp_path_factory.mktemp("inside")
-    drive = inside / "drive.mcap"
-    with open_log(places / "drive.mcap", WITH_MASKS) as log, LogWriter(drive) as writer:
-        selection = log.select()
-        for frame in (logged.decode() for logged in log.frames(selection)):
-            writer.image("/camera/image", frame.stamp_ns, bytes(frame.payload), "png")
-            if frame.truth is not None:
-                writer.mask("/truth/road", frame.stamp_ns, frame.truth * 255)
-            rolled = np.roll(frame.external["net"], frame.number % 5 - 2, 0)
-            writer.mask(IN_LOG, frame.stamp_ns, rolled * 255)
+
+    def messages(frame):
+        truth = None if frame.truth is None else frame.truth * 255
+        return {
+            "/camera/image": bytes(frame.payload),
+            "/truth/road": truth,
+            IN_LOG: rolled(frame) * 255,
+        }
+
+    frames = frames_in(places / "drive.mcap", **WITH_MASKS)
+    drive = write_drive(inside / "drive.mcap", ((f.stamp_ns, messages(f)) for f in frames))
     beside = masks(
         places,
         number={"path": "number"},
@@ -148,13 +151,10 @@ def refused(places, **table) -> str:
     return str(caught.value)
 
 
-def test_masks_of_another_time_are_refused(places, tmp_path):
-    with LogWriter(tmp_path / "other.mcap") as log:
-        log.mask("/seg", 10**18, np.eye(4, dtype=np.uint8))
+def test_masks_of_another_time_or_size_are_refused_unless_they_are_to_be_scaled(places, tmp_path):
+    write_drive(tmp_path / "other.mcap", [(10**18, {"/seg": np.eye(4, dtype=np.uint8)})])
     assert "none of them belongs to a frame" in refused(places, path=f"{tmp_path}/other.mcap:/seg")
-
-
-def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, tmp_path):
+    (tmp_path / "other.mcap").unlink()
     for number in range(FRAMES):
         mask = cv2.imread(str(places / "number" / f"frame_{number:04d}.png"), 0)
         cv2.imwrite(str(tmp_path / f"{number}.png"), cv2.resize(mask, (30, 20)) // 128 * 255)

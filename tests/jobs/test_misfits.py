@@ -11,9 +11,8 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from roadeval.logs.log import describe
-from roadeval.logs.writing.writer import LogWriter
 from tests.evaluation.test_fit import IMAGES, ROADS
+from tests.fixtures.logged import jpeg, write_drive
 from tests.jobs.making import settings
 
 NS = 100_000_000
@@ -26,17 +25,16 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Path:
     base = tmp_path_factory.mktemp("misfits")
     for name in ("late", "early", "mirrored"):
         (base / name).mkdir()
-    with LogWriter(base / "late.mcap") as late, LogWriter(base / "bare.mcap") as bare:
-        for number, image in enumerate(IMAGES):
-            stamp, (_, png) = (number + 1) * NS, cv2.imencode(".png", image)
-            for log in (late, bare):
-                log.image("/camera", stamp, png.tobytes(), "png")
-            late.mask("/truth/road", stamp + 3 * NS, ROADS[number] * 255)
-            for name, mask in (("late", ROADS[number]), ("mirrored", ROADS[number][:, ::-1])):
-                place = number + 3 if name == "late" else number
-                cv2.imwrite(str(base / name / f"{place:04d}.png"), mask * np.uint8(255))
-            if number >= 3:
-                cv2.imwrite(str(base / "early" / f"{number - 3:04d}.png"), ROADS[number] * 255)
+    images = [((n + 1) * NS, {"/camera": image[..., ::-1]}) for n, image in enumerate(IMAGES)]
+    truth = [((n + 4) * NS, {"/truth/road": ROADS[n] * 255}) for n in range(len(IMAGES))]
+    write_drive(base / "bare.mcap", images)
+    write_drive(base / "late.mcap", sorted(images + truth, key=lambda message: message[0]))
+    for number in range(len(IMAGES)):
+        for name, mask in (("late", ROADS[number]), ("mirrored", ROADS[number][:, ::-1])):
+            place = number + 3 if name == "late" else number
+            cv2.imwrite(str(base / name / f"{place:04d}.png"), mask * np.uint8(255))
+        if number >= 3:
+            cv2.imwrite(str(base / "early" / f"{number - 3:04d}.png"), ROADS[number] * 255)
     return base
 
 
@@ -67,6 +65,9 @@ def test_truth_beside_the_log_that_is_late_is_told_by_info_too_and_its_number_me
     assert said == f"{TRUTH}Set `truth.first` to 3."
     assert roadeval.info(places / "bare.mcap", config).misfits == (said,)
     assert verdict(places / "bare.mcap", tmp_path, truth={**late, "first": 3}) == ""
+    with pytest.raises(RoadevalError, match="only stamps can be moved") as refused:
+        verdict(places / "bare.mcap", tmp_path, truth=late, topics={"sync_offset_ms": 100})
+    assert refused.value.setting == "topics.sync_offset_ms"
 
 
 def test_masks_are_told_with_what_can_be_set_and_no_number_changes(
@@ -82,13 +83,6 @@ def test_masks_are_told_with_what_can_be_set_and_no_number_changes(
     assert said.count("No number is corrected for it: mend the masks where they are made.") == 2
 
 
-def test_an_offset_of_stamps_is_refused_where_numbers_pair(places: Path, tmp_path: Path) -> None:
-    late = {"path": str(places / "late"), "first": 0}
-    with pytest.raises(RoadevalError, match="only stamps can be moved") as refused:
-        verdict(places / "bare.mcap", tmp_path, truth=late, topics={"sync_offset_ms": 100})
-    assert refused.value.setting == "topics.sync_offset_ms"
-
-
 SIZES = ((64, 48), (80, 40), (40, 60))
 FRAMES = 12
 
@@ -99,19 +93,20 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     base = tmp_path_factory.mktemp("mixed")
     (base / "lab").mkdir()
     (base / "masks").mkdir()
-    with LogWriter(base / "drive.mcap") as log:
-        for number in range(FRAMES):
-            width, height = SIZES[number % len(SIZES)]
-            image = np.full((height, width, 3), 160, np.uint8)
-            truth = np.zeros((height, width), np.uint8)
-            truth[:, width // 2 :] = 255
-            image[truth > 0] = 80
-            mask = truth.copy()
-            mask[: height // 5] = 0
-            log.image("/camera", number * NS, cv2.imencode(".jpg", image)[1].tobytes(), "jpeg")
-            log.mask("/truth/road", number * NS, truth)
-            cv2.imwrite(str(base / "lab" / f"{number:04d}.png"), truth)
-            cv2.imwrite(str(base / "masks" / f"{number:04d}.png"), mask)
+
+    def messages(number):
+        width, height = SIZES[number % len(SIZES)]
+        image = np.full((height, width, 3), 160, np.uint8)
+        truth = np.zeros((height, width), np.uint8)
+        truth[:, width // 2 :] = 255
+        image[truth > 0] = 80
+        mask = truth.copy()
+        mask[: height // 5] = 0
+        cv2.imwrite(str(base / "lab" / f"{number:04d}.png"), truth)
+        cv2.imwrite(str(base / "masks" / f"{number:04d}.png"), mask)
+        return {"/camera": jpeg(image), "/truth/road": truth}
+
+    write_drive(base / "drive.mcap", ((n * NS, messages(n)) for n in range(FRAMES)))
     return base
 
 
@@ -126,7 +121,9 @@ def test_labels_are_held_against_their_own_images_and_that_sizes_vary_is_said(
     assert done.summary["totals"]["mine"]["post"]["frames"] == FRAMES
     assert done.summary["totals"]["mine"]["post"]["ERR"] == pytest.approx(0.1, abs=0.005)
     assert any("8 of the 12 are not of the first one's size" in each for each in done.warnings)
-    assert any("the images' sizes vary" in each for each in describe(drive / "drive.mcap").picks)
+    assert any(
+        "the images' sizes vary" in each for each in roadeval.info(drive / "drive.mcap").picks
+    )
 
 
 def test_a_recording_shows_all_images_in_one_size(drive: Path, tmp_path: Path) -> None:

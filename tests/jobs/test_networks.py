@@ -1,6 +1,8 @@
 """A network as a variant: in the tables, the recording, the report, a fleet and a notebook."""
 
+import hashlib
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -9,9 +11,12 @@ import pytest
 import roadeval
 from roadeval.config.variants import network_variant
 from roadeval.jobs.run import prepared
+from roadeval.jobs.run.prepared import settings_digest
 from roadeval.logs.log import open_log
-from tests.jobs.making import settings, write_log
+from tests.e2e.commands import here
+from tests.jobs.making import settings, write_log, write_module
 from tests.networks.making import network, red_network
+from tests.pipeline import somebody
 
 
 @pytest.fixture(scope="module")
@@ -89,14 +94,11 @@ def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder
 # --- Nothing to learn -----------------------------------------------------------------------------
 
 
-def test_a_network_alone_takes_no_frame_and_needs_no_baseline(folder, tmp_path):
+def test_a_network_alone_needs_no_frame_no_baseline_and_no_truth(folder, tmp_path):
     found = run(folder / "drive.mcap", tmp_path, alone(folder / "red.onnx")).summary
     assert set(found["totals"]) == {"unfiltered"}
     assert found["training"]["pixels"] == 0
     assert found["frames"]["evaluated"] == found["frames"]["labelled"]
-
-
-def test_a_network_alone_runs_on_a_drive_without_truth(folder, tmp_path):
     outcome = run(folder / "bare.mcap", tmp_path, alone(folder / "red.onnx"))
     assert outcome.summary["frames"]["trained_on"] == 0
     assert outcome.summary["training"]["source"] == "none"
@@ -137,3 +139,109 @@ def test_a_network_that_never_says_road_is_told_of(folder, tmp_path):
     outcome = run(folder / "drive.mcap", tmp_path, with_network(path))
     assert "mine: its final mask is road nowhere, on every frame" in outcome.warnings
     assert outcome.summary["totals"]["mine"]["post"]["FNR"] == 1
+
+
+# --- A method of one's own in a run: tables, frames that it loses, models, and recordings ---------
+
+
+def somebodys(name):
+    return {"chain": [f"tests.pipeline.somebody:{name}", "post"]}
+
+
+def line_of(text):
+    """The line of the one place in the methods' file that has a text."""
+    lines = Path(somebody.__file__).read_text().splitlines()
+    (found,) = (number for number, line in enumerate(lines, 1) if text in line)
+    return found
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    return write_log(tmp_path_factory.mktemp("log") / "drive.mcap")
+
+
+def run_settings(drive, to, **values):
+    return roadeval.replay(drive, settings(**values), save=to / "o.rrd", reports=to / "reports")
+
+
+def test_it_stands_in_tables_and_recording(drive, tmp_path):
+    run_settings(drive, tmp_path, variants={"mine": somebodys("LEARNS")})
+    rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
+    assert set(rows.stage) == {"bright", "post"}
+    assert rows.ERR.max() < 0.05
+    assert roadeval.Recording(tmp_path / "o.rrd").layer("mine", "level", 15).shape
+
+
+def test_a_frame_on_which_it_fails_is_lost_and_the_rest_is_scored(drive, tmp_path):
+    outcome = run_settings(drive, tmp_path, variants={"mine": somebodys("fails_on_13")})
+    assert outcome.losses == (
+        "frame 13: variant mine: stage fails_on_13 failed: ZeroDivisionError: no road "
+        f"(somebody.py:{line_of('ZeroDivisionError')})",
+    )
+    frames = outcome.summary["frames"]
+    assert frames["evaluated"] == 14
+    assert frames["skipped"]["failed in a stage"] == 1
+    assert frames["evaluated"] + sum(frames["skipped"].values()) == frames["in_log"]
+    assert len(outcome.tracebacks) == 1
+    assert "somebody.py" in outcome.tracebacks[0]
+
+
+def test_where_the_first_frames_all_fail_or_it_cannot_learn_the_run_ends(drive, tmp_path):
+    variants = {"mine": somebodys("always_fails"), "fine": somebodys("lower_half")}
+    with pytest.raises(roadeval.RoadevalError) as caught:
+        run_settings(drive, tmp_path, variants=variants)
+    assert str(caught.value) == (
+        "variant mine: stage always_fails failed: KeyError: 'weights' "
+        f"(somebody.py:{line_of('KeyError')}), on each of the first 10 frames (10 to 19); mend it, "
+        "or leave the variant out with `only` filtered `only` unfiltered `only` fine"
+    )
+    assert "in always_fails" in str(caught.value.__cause__)
+    with pytest.raises(roadeval.RoadevalError, match="stage unfit cannot learn: ValueError"):
+        run_settings(drive, tmp_path, variants={"mine": somebodys("UNFIT")})
+
+
+def test_what_it_learns_stands_in_a_model_file(drive, tmp_path):
+    path, variants = tmp_path / "m.model", {"mine": somebodys("LEARNS")}
+    config = settings(variants=variants, train_frames=4)
+    model = roadeval.train([drive], path, config)
+    outcome = run_settings(drive, tmp_path, variants=variants, model=path)
+    assert outcome.summary["totals"]["mine"]["post"]["ERR"] < 0.05
+    with pytest.raises(roadeval.RoadevalError, match="mine/bright is no stage that learns"):
+        roadeval.load_model(path)  # a file by itself loads nobody's code
+    own = config.pipelines()["mine"].stages()
+    assert roadeval.load_model(path, own).parameters["mine"] == model.parameters["mine"]
+
+
+def test_results_tell_the_code_and_are_known_by_it(drive, tmp_path, monkeypatch):
+    outcome = run_settings(drive, tmp_path, variants={"mine": somebodys("lower_half")})
+    told = outcome.summary["methods"]["mine"]["lower_half"]
+    assert told["stage"] == "tests.pipeline.somebody:lower_half"
+    assert told["sha256"] == hashlib.sha256(Path(somebody.__file__).read_bytes()).hexdigest()
+
+    def known_by(text):
+        write_module(tmp_path / "changing.py", text)
+        return settings_digest(settings(chain=["changing:road", "post"]), "")
+
+    monkeypatch.syspath_prepend(tmp_path)
+    one = "def road(image): return image[..., 0] > 1\n"
+    other = "def road(image): return image[..., 0] > 20\n"
+    assert known_by(one) == known_by(one) != known_by(other)
+
+
+def test_a_recording_loads_no_code(drive, tmp_path):
+    run_settings(drive, tmp_path, variants={"mine": somebodys("lower_half")})
+    with pytest.raises(roadeval.RoadevalError, match="which is loaded only from a"):
+        roadeval.load_config(tmp_path / "o.rrd")
+    again = roadeval.load_config(tmp_path / "reports" / "run.toml")
+    assert "mine" in again.pipelines()
+
+
+@pytest.mark.parametrize("debug", ["0", "1"])
+def test_its_traceback_is_shown_where_it_is_asked_for(debug, drive, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROADEVAL_DEBUG", debug)
+    (tmp_path / "mine.toml").write_text('chain = ["tests.pipeline.somebody:fails_on_13", "post"]\n')
+    words = ("--variant", f"mine={tmp_path / 'mine.toml'}", "--reports", tmp_path / "reports")
+    run = here("replay", drive, "-q", "--record", "none", *words)
+    assert run.returncode == 3
+    assert "roadeval: lost: frame 13: variant mine: stage fails_on_13 failed" in run.stderr
+    assert ("Traceback" in run.stderr) == (debug == "1")

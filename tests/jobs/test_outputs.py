@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 import roadeval
-from roadeval import RoadevalError
+from roadeval import RoadevalError, write_report
 from roadeval.config.settings import OutputSettings
 from roadeval.jobs.outputs import Outputs, holding
 from roadeval.jobs.results import inspect
-from roadeval.jobs.results.report import write_report
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs.log import Log
 from tests.faults import making

@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 import roadeval
-from roadeval import RoadevalError
-from roadeval.config.run import load_config
+from roadeval import RoadevalError, load_config
 from roadeval.jobs.run import prepared
 from roadeval.jobs.run import replay as replaying
 from roadeval.logs.log import open_log
@@ -284,11 +283,6 @@ def of(path, **values):
         return prepared.identity(log, settings(**values))
 
 
-def test_two_drives_of_one_name_differ(a_log, tmp_path):
-    other = write_log(tmp_path / "drive.mcap", broken=3)
-    assert of(a_log) != of(other)
-
-
 @pytest.mark.parametrize(
     "values",
     [
@@ -314,18 +308,15 @@ def test_two_models_differ_and_one_is_the_same_wherever_it_lies(a_log, tmp_path)
     assert of(a_log, model=one) != of(a_log)
 
 
-def test_two_versions_differ(a_log, monkeypatch):
-    before = of(a_log)
+def test_other_frames_under_the_same_name_and_another_version_differ_and_other_places_do_not(
+    a_log, tmp_path, monkeypatch
+):
+    before, copy = of(a_log), shutil.copy(a_log, tmp_path / "drive.mcap")
+    places = {"output": {"save": "x.rrd", "reports": "y", "mcap": "z.mcap"}}
+    assert of(copy, jobs=3, **places) == before
+    assert of(write_log(copy, broken=3)) != before
     monkeypatch.setattr(prepared, "VERSION", "99.0")
     assert of(a_log) != before
-
-
-def test_where_a_log_lies_how_many_threads_and_where_results_land_make_no_difference(
-    a_log, tmp_path
-):
-    shutil.copy(a_log, tmp_path / "drive.mcap")
-    places = {"output": {"save": "x.rrd", "reports": "y", "mcap": "z.mcap"}}
-    assert of(a_log) == of(tmp_path / "drive.mcap", jobs=3, **places)
 
 
 CODES = "labels = { road = [3] }"
@@ -374,17 +365,10 @@ def split_without_its_second_file(folder):
     return folder
 
 
-def test_what_is_lost_of_a_log_is_told(tmp_path):
-    losses = train([split_without_its_second_file(tmp_path / "split")], tmp_path).losses
-    assert [loss.partition(": ")[0] for loss in losses] == [
-        "split_1.mcap",
-        "/camera/image",
-        "/truth/road",
-    ]
-
-
-def test_what_is_lost_of_several_logs_begins_with_the_name_of_one(tmp_path):
+def test_what_is_lost_of_a_log_is_told_and_of_several_with_its_name(tmp_path):
     logs = write_log(tmp_path / "a.mcap", broken=0), split_without_its_second_file(tmp_path / "b")
+    lost = [loss.partition(": ")[0] for loss in train(logs[1:], tmp_path).losses]
+    assert lost == ["split_1.mcap", "/camera/image", "/truth/road"]
     losses = train(logs, tmp_path).losses
     assert [loss.split(": ")[:2] for loss in losses] == [
         ["a.mcap", "frame 0"],

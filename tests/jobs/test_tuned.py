@@ -3,22 +3,21 @@
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 
-import cv2
 import numpy as np
 import pandas as pd
 import pytest
 from onnx import helper
 
 import roadeval
-from roadeval.config.run import configure
+from roadeval import configure
 from roadeval.config.tables import ConfigError
 from roadeval.config.variants import network_variant
 from roadeval.jobs.run.prepared import prepare
 from roadeval.logs.log import open_log
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.networks import network as networks
 from roadeval.results.verdict import verdicts
 from roadeval.training.model import arrays_of
+from tests.fixtures.logged import write_drive
 from tests.networks.making import IMAGE, ROAD, red_network, written
 
 SIZE = (48, 64)
@@ -51,17 +50,14 @@ def picture(number):
 
 def write(path, *, mirrored_truth_from=FRAMES, without=(), first=0):
     """A drive with masks that are blind to shade; some frames may have another truth, or none."""
-    with LogWriter(path) as writer:
-        for number in range(FRAMES):
-            image, road = picture(first + number)
-            truth = road if number < mirrored_truth_from else np.ascontiguousarray(road[::-1])
-            stamp = (number + 1) * NS
-            _, png = cv2.imencode(".png", image[..., ::-1])
-            writer.image("/camera/image", stamp, png.tobytes(), "png")
-            writer.mask("/truth/road", stamp, truth * 255)
-            if number not in without:
-                writer.mask("/net/mask", stamp, (image[..., 0] > 105).astype(np.uint8) * 255)
-    return path
+
+    def messages(number):
+        image, road = picture(first + number)
+        truth = road if number < mirrored_truth_from else np.ascontiguousarray(road[::-1])
+        mask = None if number in without else (image[..., 0] > 105).astype(np.uint8) * 255
+        return {"/camera/image": image, "/truth/road": truth * 255, "/net/mask": mask}
+
+    return write_drive(path, (((number + 1) * NS, messages(number)) for number in range(FRAMES)))
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from onnx import TensorProto, helper
 
-from roadeval.data import CERTAIN
-from roadeval.networks import NetSettings, Network, NetworkError
+from roadeval import data, networks
 from tests.networks.making import IMAGE as MADE
 from tests.networks.making import ROAD, SIZE, balanced, network, scores, without_end, written
 
@@ -19,8 +18,8 @@ IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
 FRAME = cv2.resize(IMAGE, (48, 30), interpolation=cv2.INTER_CUBIC)
 
 
-def opened(path, **settings) -> Network:
-    return Network.of(NetSettings(file=str(path), **settings))
+def opened(path, **settings) -> networks.Network:
+    return networks.Network.of(networks.NetSettings(file=str(path), **settings))
 
 
 def framed(values, size=SIZE):
@@ -37,7 +36,7 @@ def test_the_mask_is_the_one_that_numpy_computes(tmp_path):
     values = balanced(IMAGE)
     road = opened(network(tmp_path / "n.onnx", values=values)).road(IMAGE)
     expected = softmax(framed(scores(values, IMAGE.transpose(2, 0, 1) / 255)))[1]
-    assert np.abs(road.probability / CERTAIN - expected).max() < 1e-4
+    assert np.abs(road.probability / data.CERTAIN - expected).max() < 1e-4
     assert np.array_equal(road.mask.pixels(), expected > 0.5)
     assert 0.2 < road.mask.pixels().mean() < 0.8
 
@@ -51,33 +50,23 @@ def test_a_threshold_is_heeded_whatever_decides(classes, decide, tmp_path):
     reader = opened(path, threshold=0.7, decide=decide, road=(classes - 1,))
     road = reader.road(FRAME)
     assert reader.settings.decide == (decide or "threshold")
-    assert np.array_equal(road.mask.pixels(), road.probability > round(0.7 * CERTAIN))
-
-
-def test_a_threshold_on_classes_alone_is_refused(tmp_path):
-    with pytest.raises(NetworkError, match=r"`net\.threshold`"):
-        opened(network(tmp_path / "n.onnx", last="ArgMax"), road=(1,), threshold=0.7)
-
-
-def test_of_three_classes_road_is_where_it_beats_the_others(tmp_path):
-    values = balanced(IMAGE, 3)
-    path = network(tmp_path / "n.onnx", classes=3, values=values)
-    road = opened(path, road=(2,)).road(IMAGE)
-    logits = framed(scores(values, IMAGE.transpose(2, 0, 1) / 255))
-    assert np.array_equal(road.mask.pixels(), logits.argmax(axis=0) == 2)
+    assert np.array_equal(road.mask.pixels(), road.probability > round(0.7 * data.CERTAIN))
 
 
 @pytest.mark.parametrize("last", [None, "Softmax"])
-def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
+def test_road_is_where_it_beats_the_others_and_as_probable_as_its_classes(last, tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values, last=last)
     road = opened(path, road=(0, 2), decide="threshold").road(IMAGE)
     logits = scores(values, IMAGE.transpose(2, 0, 1) / 255)
+    if last is None:
+        best = opened(path, road=(2,)).road(IMAGE).mask.pixels()
+        assert np.array_equal(best, framed(logits).argmax(axis=0) == 2)
     # Logits are interpolated where there are any.
     shares = framed(softmax(logits)) if last else softmax(framed(logits))
-    assert np.abs(road.probability / CERTAIN - shares[0] - shares[2]).max() < 1e-4
+    assert np.abs(road.probability / data.CERTAIN - shares[0] - shares[2]).max() < 1e-4
     for codes, number in zip(road.by_class, (0, 2), strict=True):
-        assert np.abs(codes / CERTAIN - shares[number]).max() < 1e-4
+        assert np.abs(codes / data.CERTAIN - shares[number]).max() < 1e-4
 
 
 def test_classes_are_brought_to_the_frame_by_the_nearest_pixel(tmp_path):
@@ -97,7 +86,7 @@ def test_channels_scale_mean_and_deviation_are_applied_in_this_order(tmp_path):
     ).road(IMAGE)
     planes = ((IMAGE[..., ::-1] / 255 - mean) / deviation).transpose(2, 0, 1)
     expected = softmax(framed(scores(values, planes)))[1]
-    assert np.abs(road.probability / CERTAIN - expected).max() < 1e-4
+    assert np.abs(road.probability / data.CERTAIN - expected).max() < 1e-4
 
 
 @pytest.mark.parametrize("last", [None, "Sigmoid"])
@@ -161,7 +150,7 @@ def test_numbers_that_are_none_are_an_error_of_a_network_with_a_softmax_inside(t
     path = _depending(tmp_path / "n.onnx", *nodes, high=np.float32(0.9), nan=np.float32(np.nan))
     reader = opened(path)
     assert reader.settings.activation == "none"
-    with pytest.raises(NetworkError, match="NaN"):
+    with pytest.raises(networks.NetworkError, match="NaN"):
         reader.road(FRAME)
 
 
@@ -174,7 +163,7 @@ def test_a_shape_that_depends_on_the_image_is_an_error(tmp_path):
         helper.make_node("Slice", [MADE, "zero", "count", "zero1"], [ROAD]),
     ]
     path = _depending(tmp_path / "n.onnx", *nodes)
-    with pytest.raises(NetworkError, match="'road' depends on the image"):
+    with pytest.raises(networks.NetworkError, match="'road' depends on the image"):
         opened(path)
 
 
@@ -185,7 +174,7 @@ def test_a_loop_that_ends_on_black_images_alone_is_ended(tmp_path):
         without_end("bright"),
     ]
     path = written(tmp_path / "n.onnx", nodes, {"none": np.float32(0)})
-    with pytest.raises(NetworkError, match=r"takes longer than 0\.5 s"):
+    with pytest.raises(networks.NetworkError, match=r"takes longer than 0\.5 s"):
         opened(path, seconds=0.5, road=(0,))
 
 
@@ -196,12 +185,12 @@ def _everywhere(classes):
     return values
 
 
-def read(path, **settings) -> NetSettings:
-    return Network.of(NetSettings(file=str(path), **settings)).settings
+def read(path, **settings) -> networks.NetSettings:
+    return networks.Network.of(networks.NetSettings(file=str(path), **settings)).settings
 
 
 def refusal(path, **settings) -> str:
-    with pytest.raises(NetworkError) as caught:
+    with pytest.raises(networks.NetworkError) as caught:
         read(path, **settings)
     message = str(caught.value)
     assert message.startswith(f"{path}: ")
@@ -220,8 +209,8 @@ def test_everything_is_stated_of_a_network_of_two_classes(tmp_path):
 def test_another_file_than_the_stated_one_is_refused(tmp_path):
     settings = read(network(tmp_path / "n.onnx"))
     network(tmp_path / "n.onnx", last="Softmax")
-    with pytest.raises(NetworkError, match="another network than was asked for"):
-        Network.of(settings)
+    with pytest.raises(networks.NetworkError, match="another network than was asked for"):
+        networks.Network.of(settings)
 
 
 # --- What is asked for ----------------------------------------------------------------------------
@@ -240,6 +229,11 @@ ASKED = {
         "give the numbers of those that are road by `net.road`",
     ),
     "which labels": ({"last": "ArgMax"}, {}, "`net.road`"),
+    "a threshold on classes alone": (
+        {"last": "ArgMax"},
+        {"road": (1,), "threshold": 0.7},
+        "`net.threshold`",
+    ),
     "a class that is not there": ({}, {"road": (2,)}, "has no class 2, but 2 from 0"),
     "one class beats no other": ({"classes": 1}, {"decide": "argmax"}, "`net.decide`"),
     "four images at once": (
@@ -270,5 +264,5 @@ def test_a_size_that_is_left_open(tmp_path):
 
 
 def test_no_file(tmp_path):
-    with pytest.raises(NetworkError, match=r"net\.file"):
-        Network.of(NetSettings())
+    with pytest.raises(networks.NetworkError, match=r"net\.file"):
+        networks.Network.of(networks.NetSettings())

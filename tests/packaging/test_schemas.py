@@ -9,10 +9,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import roadeval
-from roadeval.cli.app import main
-from roadeval.config.run import run_toml
-from roadeval.config.variants import PRESETS
-from roadeval.version import REPOSITORY, VERSION
+from tests.e2e.commands import here
 from tests.golden import drive
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,11 +32,12 @@ def test_the_schemas_are_those_of_the_code():
         assert text == made, "out of date: run python docs/generated.py"
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", RUN.schema["properties"]["preset"]["enum"])
 def test_every_preset_is_valid(preset):
     more = {"variants": {"wide": {"preset": "paper", "shadow": {"ring_width": 2}}}}
-    text = run_toml(roadeval.configure({"preset": preset, **more}), "drive", VERSION)
-    RUN.validate(tomllib.loads(text))
+    RUN.validate(
+        tomllib.loads(roadeval.config_toml(roadeval.configure({"preset": preset, **more})))
+    )
 
 
 @pytest.mark.parametrize(
@@ -76,9 +74,8 @@ def test_the_summaries_of_a_drive_and_of_one_without_truth_are_valid(tmp_path):
         assert {*summary} <= {*SUMMARY.schema["$defs"]["Facts"]["properties"]}
 
 
-def test_the_printed_configuration_names_its_schema(capsys):
-    main(["config"])
-    first = capsys.readouterr().out.partition("\n")[0]
-    assert first == f"#:schema {REPOSITORY}/raw/v{VERSION}/docs/schemas/run.schema.json"
+def test_the_printed_configuration_names_its_schema():
+    first = here("config").stdout.partition("\n")[0]
     urls = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]
-    assert urls["Repository"] == REPOSITORY
+    place = f"raw/v{roadeval.__version__}/docs/schemas/run.schema.json"
+    assert first == f"#:schema {urls['Repository']}/{place}"

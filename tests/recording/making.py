@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from roadeval import Recording
 from roadeval.data import (
     ERRORS,
     Counts,
@@ -32,7 +33,6 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.recording import rrd_file
 from roadeval.recording.layout import Layout
 from roadeval.recording.recorder import Recorder
-from roadeval.recording.recording import Recording
 from roadeval.recording.rrd_file import RrdFile
 from roadeval.results.schema import TABLES
 from tests.results.making import facts_of, lines

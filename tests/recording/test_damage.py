@@ -9,10 +9,9 @@ from hashlib import sha256
 import numpy as np
 import pytest
 
-from roadeval.errors import RoadevalError
+from roadeval import Recording, RoadevalError
 from roadeval.recording import layout as at
 from roadeval.recording.layout import DamagedError
-from roadeval.recording.recording import Recording
 from roadeval.recording.rrd_file import ALWAYS
 
 MUTATIONS = 120

@@ -11,8 +11,7 @@ import rerun_cli
 from rerun.chunk import RrdReader
 
 import roadeval
-from roadeval.errors import RoadevalError
-from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME, LOG_TIME
+from roadeval import RoadevalError
 from tests.jobs.making import settings, write_log
 from tests.logs.topics.test_calibration import info, ros2
 
@@ -131,7 +130,7 @@ def test_a_part_of_a_split_is_refused_as_one(folder: Path, tmp_path: Path, part:
         read(parts[part])
 
 
-LOADER = (HEADER_TIME, FOXGLOVE_TIME, LOG_TIME)
+LOADER = HEADER_TIME, FOXGLOVE_TIME, LOG_TIME = "ros2_timestamp", "timestamp", "message_log_time"
 
 
 def times(path: Path, entity: str) -> dict[str, list[int]]:

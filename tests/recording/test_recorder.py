@@ -17,11 +17,11 @@ import psutil
 import pytest
 import rerun as rr
 
+from roadeval import Recording
 from roadeval.data import Doubt
 from roadeval.recording import recorder as recorder_module
 from roadeval.recording.layout import RecordingError, RecordRule
 from roadeval.recording.recorder import LEAST_FREE, Recorder, worst_error
-from roadeval.recording.recording import Recording
 from roadeval.recording.rows import (
     CHUNK_BYTES,
     IMAGES_AND_TEXT,

@@ -6,8 +6,8 @@ from typing import Any
 
 from rerun.chunk import RrdReader
 
+from roadeval import Recording
 from roadeval.recording.layout import FRAME
-from roadeval.recording.recording import Recording
 from roadeval.recording.rrd_file import RrdFile
 
 

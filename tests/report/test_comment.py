@@ -11,7 +11,7 @@ from roadeval.evaluation.comparison.conditions import Condition, judge
 from roadeval.evaluation.comparison.pairing import MovedFrame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.report.comment import MOST, badge, changes, levels
-from roadeval.report.comparison import comment
+from roadeval.report.comparison import changed_drives, comment
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 WORSE, BETTER = a_difference(1.2, 0.5, 2, p=0.001), a_difference(-1.2, -2, -0.5, p=0.001)
@@ -121,3 +121,15 @@ def test_levels_leave_out_what_is_undefined_and_are_thinned():
     assert "bar [1.0, 3.0]\nline [2.0, 4.0]" in levels([(1.0, 2.0), (math.nan, 1.0), (3.0, 4.0)])
     assert levels([(1.0, 2.0)]) == ""
     assert levels([(1.0, 2.0)] * 500).count("1.0") <= 61
+
+
+# --- The report of a comparison: what its headings name -------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("result", "title"), [("net", "net differs from base"), ("new", "net changed")]
+)
+def test_drives_on_which_a_mask_differs_are_headed_by_the_two(result, title):
+    row = DriveChange(result, "net", "post", "street", 12, 0.1, 0.2, WORSE, 0.01, changed=True)
+    heading, _ = changed_drives(a_comparison(a_change(WORSE, "net", result), drives=(row,)))
+    assert heading.text == f"Drives on which {title}, the surest first"

@@ -3,6 +3,8 @@
 import hashlib
 import json
 import math
+import os
+import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -11,19 +13,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from roadeval.data import FrameResult, Packed, Role
 from roadeval.evaluation.score.frame import BlindPrior
 from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.tables import only
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
 from roadeval.results.facts import Facts, FrameAccount, LogFacts, digest_of
+from roadeval.results.fleet import FleetFolder, FleetWriter, Made, cached_path, read_made
 from roadeval.results.folder import ResultsFolder, ResultsWriter, names_of_results
 from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
-from roadeval.results.tables import ResultsError
+from roadeval.results.tables import ResultsError, read_parquet
 from tests.evaluation.making import a_frame, a_variant, pixels
 from tests.evaluation.test_scoreboard import effects_of
+from tests.results.fleet.making import fleet_of
 from tests.results.making import KEY, facts_of, lines, sum_lines
 
 TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
@@ -131,17 +137,20 @@ def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: A
 
 
 @pytest.mark.parametrize("table", OF_A_DRIVE)
-def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, table: str) -> None:
+def test_a_table_that_was_cut_or_taken_away_is_refused(tmp_path: Path, table: str) -> None:
     write(tmp_path)
     path = tmp_path / f"{table}.csv"
     lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(lines[:-1]))
-    with pytest.raises(ResultsError) as caught:
-        ResultsFolder(tmp_path).table(table)
-    assert str(caught.value) == (
-        f"{path}: does not agree with its summary ({len(lines) - 2} of {len(lines) - 1} rows); "
-        "make the results again with roadeval replay"
-    )
+    for left, cut in (
+        (len(lines) - 2, lambda: path.write_text("".join(lines[:-1]))),
+        (0, path.unlink),
+    ):
+        cut()
+        with pytest.raises(ResultsError) as caught:
+            ResultsFolder(tmp_path).table(table)
+        agreed = f"does not agree with its summary ({left} of {len(lines) - 1} rows)"
+        again = "make the results again with roadeval replay"
+        assert str(caught.value) == f"{path}: {agreed}; {again}"
 
 
 def test_a_table_with_one_number_changed_is_refused(tmp_path: Path) -> None:
@@ -150,14 +159,6 @@ def test_a_table_with_one_number_changed_is_refused(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("filtered,0,0,8,23", "filtered,0,0,8,24"))
     with pytest.raises(ResultsError, match=r"summary \(its content differs\)"):
         ResultsFolder(tmp_path).table("heat")
-
-
-@pytest.mark.parametrize("table", OF_A_DRIVE)
-def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> None:
-    write(tmp_path)
-    (tmp_path / f"{table}.csv").unlink()
-    with pytest.raises(ResultsError, match=r"\.csv: does not agree with its summary \(0 of"):
-        ResultsFolder(tmp_path).table(table)
 
 
 def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:
@@ -281,29 +282,23 @@ def test_a_summary_of_another_format_is_refused_with_who_wrote_it(summary, told)
         ("difference", {"post": {"ERR": {"mean": "high"}}}),
         ("cameras", []),
         ("cameras", {"left": "no facts"}),
+        *((part, ...) for part in ("verdict", "frames", "totals", "difference")),
     ],
 )
-def test_a_part_of_another_shape_is_damage(part, value):
-    with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
-        Facts.parse(changed(**{part: value}), "here")
-
-
-@pytest.mark.parametrize("part", ["verdict", "frames", "totals", "difference"])
-def test_a_part_that_is_not_there_is_named(part):
-    content = json.loads(WRITTEN.text())
-    del content[part]
+def test_a_part_that_is_not_there_or_of_another_shape_is_damage(part, value):
+    content = json.loads(changed(**{part: None if value is ... else value}))
+    if value is ...:
+        del content[part]
     with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
         Facts.parse(json.dumps(content), "here")
 
 
 def test_a_number_that_was_changed_is_damage():
     other = {**TOTALS, "filtered": {"post": {"ERR": 0.3, "frames": 100}}}
-    with pytest.raises(ResultsError, match=r"here: damaged \(its content is not what was"):
-        Facts.parse(changed(totals=other), "here")
-    content = json.loads(WRITTEN.text())
-    del content["claims"]
-    with pytest.raises(ResultsError, match="here: damaged"):
-        Facts.parse(json.dumps(content), "here")
+    without = {key: part for key, part in json.loads(WRITTEN.text()).items() if key != "claims"}
+    for text in (changed(totals=other), json.dumps(without)):
+        with pytest.raises(ResultsError, match=r"here: damaged \(its content is not what was"):
+            Facts.parse(text, "here")
 
 
 def test_where_files_lie_may_change():
@@ -323,3 +318,220 @@ def test_parts_that_a_later_version_covers_are_checked_by_this_one():
     assert Facts.parse(sealed(content), "here") == WRITTEN
     with pytest.raises(ResultsError, match="damaged"):
         Facts.parse(json.dumps(json.loads(sealed(content)) | {"new": [1, 3]}), "here")
+
+
+# --- A fleet's folder read back: what is damaged in it is told in one line ------------------------
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    return fleet_of(tmp_path_factory.mktemp("fleets") / "week", 5)
+
+
+@pytest.fixture
+def folder(made, tmp_path):
+    return shutil.copytree(made, tmp_path / "week")
+
+
+def change(path, **parts):
+    path.write_text(json.dumps(json.loads(path.read_text()) | parts))
+
+
+@pytest.mark.parametrize(
+    ("part", "other"), [("verdict", "Better."), ("counts", {}), ("frames", 5), ("totals", {})]
+)
+def test_a_result_that_was_changed_is_damage_which_the_same_command_mends(folder, part, other):
+    change(folder / "fleet.json", **{part: other})
+    told = r"fleet\.json: damaged .its content is not what was.*run the fleet's command again"
+    with pytest.raises(ResultsError, match=told):
+        FleetFolder(folder)
+    assert FleetFolder(fleet_of(folder, 5)).facts.verdict != "Better."
+
+
+@pytest.mark.parametrize("part", ["drives", "effects", "strata"])
+@pytest.mark.parametrize("value", [None, 5, {}, [5]])
+def test_a_part_of_a_fleet_of_another_shape_is_damage(folder, part, value):
+    change(folder / "fleet.json", **{part: value, "digest": None})
+    with pytest.raises(ResultsError, match=f"damaged .`{part}` is not what it must be"):
+        FleetFolder(folder)
+
+
+def test_a_file_that_is_no_fleet_is_mended_by_the_same_command(folder):
+    (folder / "fleet.json").write_text("{")
+    assert len(FleetFolder(fleet_of(folder, 5)).facts.drives) == 5
+
+
+def test_another_version_s_folder_is_not_written_to(folder):
+    change(folder / "fleet.json", format={"name": "roadeval-fleet", "version": 9})
+    with pytest.raises(ResultsError, match=r"made by roadeval .*, a later version"):
+        fleet_of(folder, 5)
+
+
+@pytest.mark.parametrize("name", ["frames", "scores"])
+def test_a_cached_table_that_has_gone_is_made_anew(folder, name):
+    rows = FleetFolder(folder).table(name)
+    drive = FleetFolder(folder).facts.drives[0].drive
+    cached_path(folder, name, drive).unlink()
+    if name == "frames":
+        with pytest.raises(ResultsError, match="is not there; run the fleet's command again"):
+            FleetFolder(folder).table(name)
+    FleetWriter(folder).finish(FleetFolder(folder).facts.drives, EvaluationSettings(), {}, "")
+    assert cached_path(folder, name, drive).exists()
+    assert FleetFolder(folder).table(name).equals(rows)
+
+
+@pytest.mark.parametrize("table", ["drives", "scores", "effects"])
+def test_a_flipped_bit_in_a_table_s_page_is_damage(folder, table):
+    path = folder / f"{table}.parquet"
+    pages = parquet.ParquetFile(path).metadata.row_group(0)
+    content = path.read_bytes()
+    for number in range(pages.num_columns):
+        column = pages.column(number)
+        begin = column.dictionary_page_offset or column.data_page_offset
+        last = begin + column.total_compressed_size - 1
+        path.write_bytes(content[:last] + bytes([content[last] ^ 1]) + content[last + 1 :])
+        with pytest.raises(ResultsError, match=rf"{table}\.parquet: damaged"):
+            FleetFolder(folder).table(table)
+
+
+def test_some_columns_are_read_alone_with_tags_and_damage_elsewhere_is_not_seen(folder):
+    whole, path = FleetFolder(folder), folder / "drives.parquet"
+    columns = {"drives": ["drive", "evaluated"], "scores": ["drive", "truth", "ERR"]}
+    for name, chosen in columns.items():
+        rows = whole.table(name)
+        tags = [column for column in rows if column.startswith("tag_")]
+        some = read_parquet([folder / f"{name}.parquet"], name, chosen)
+        assert {*some} == {*chosen, *tags}
+        assert some.equals(rows[[*some]])
+        with pytest.raises(ResultsError, match=r"damaged .no column FPR"):
+            read_parquet([path], "scores", ["drive", "FPR"])
+    place = path.read_bytes().index(b"/camera/image")
+    path.write_bytes(path.read_bytes().replace(b"/camera/image", b"/camera/imagf"))
+    assert place > 0
+    with pytest.raises(ResultsError, match="damaged"):
+        whole.table("drives")
+    assert len(read_parquet([path], "drives", columns["drives"])) == 5
+
+
+def test_of_an_older_fleet_nothing_is_known_of_the_truth(folder):
+    rows = FleetFolder(folder).table("scores")
+    for name in ("scores", "frames"):
+        for path in folder.rglob(f"{name}.parquet"):
+            parquet.write_table(parquet.read_table(path, partitioning=None).drop("truth"), path)
+    older = FleetFolder(folder)
+    assert older.table("scores").equals(rows.assign(truth=0))
+    assert {*older.table("frames")["truth"]} == {0}
+    some = read_parquet([folder / "scores.parquet"], "scores", ["drive", "truth"])
+    assert {*some["truth"]} == {0}
+
+
+def test_a_column_that_one_of_several_files_lacks_is_damage(folder):
+    paths = [folder / "first.parquet", folder / "scores.parquet"]
+    parquet.write_table(parquet.read_table(paths[1]).drop("FPR"), paths[0])
+    with pytest.raises(ResultsError, match=r"first\.parquet: damaged .no column FPR"):
+        read_parquet(paths, "scores")
+
+
+# --- How a drive's results were made: written and read back as it was -----------------------------
+
+MADE = Made("a", "asked", {"caf\udce9.mcap": [1, 2]})
+"""A file's name holds a byte that is no text."""
+
+
+@pytest.fixture
+def results(tmp_path):
+    """The folder of a fleet with a drive whose results are there."""
+    summary = tmp_path / "results" / "a" / "summary.json"
+    summary.parent.mkdir(parents=True)
+    summary.touch()
+    MADE.write(tmp_path)
+    return tmp_path / "results"
+
+
+@pytest.mark.parametrize(
+    ("was", "now"), [('"asked"', '"other"'), ("[1, 2]", "[]"), ('"drive": "a"', '"drive": "b"')]
+)
+def test_what_is_read_is_what_was_written_and_what_was_changed_is_none(results, was, now):
+    assert replace(read_made(results.parent, "a"), results="") == MADE
+    path = results / "a.json"
+    text = path.read_text()
+    assert text.count(was) >= 1
+    path.write_text(text.replace(was, now))
+    assert read_made(results.parent, "a") is None
+
+
+def test_a_drive_whose_summary_is_another_or_has_gone_is_none_but_for_one_that_failed(results):
+    (results / "a" / "summary.json").write_text("{}")
+    assert read_made(results.parent, "a") is None
+    (results / "a" / "summary.json").unlink()
+    assert read_made(results.parent, "a") is None
+    failed = replace(MADE, problem="no frames")
+    failed.write(results.parent)
+    assert read_made(results.parent, "a") == failed
+    assert read_made(results.parent, "b") is None
+
+
+# --- The cache of tables, which follows from the results ------------------------------------------
+
+
+def finished(folder, members=None):
+    members = members or FleetFolder(folder).facts.drives
+    return FleetWriter(folder).finish(members, EvaluationSettings(), {}, "")
+
+
+def test_a_tag_may_be_called_as_a_column_is(tmp_path):
+    folder = fleet_of(tmp_path / "f", 12)
+    drives = FleetFolder(folder).facts.drives
+    tagged = [replace(d, tags={"camera": "left" * (n % 2)}) for n, d in enumerate(drives)]
+    assert {part.tag for part in finished(folder, tagged).strata} == {"camera"}
+
+
+@pytest.fixture(scope="module")
+def pictured(tmp_path_factory):
+    """A fleet with pictures, and what its tables are summed up to."""
+    folder = fleet_of(tmp_path_factory.mktemp("pictured") / "f", 2, pictures=2)
+    return folder, finished(folder)
+
+
+@pytest.mark.parametrize("table", ["frames", "regions", "scores", "worst"])
+def test_a_cached_table_that_is_damaged_is_made_anew(pictured, tmp_path, table):
+    folder, before = shutil.copytree(pictured[0], tmp_path / "f"), pictured[1]
+    next((folder / table).rglob("*.parquet")).write_bytes(b"PAR1")
+    assert finished(folder) == before
+    assert len(FleetFolder(folder).table(table))
+
+
+def test_results_that_are_put_in_place_of_others_are_never_taken_for_these(tmp_path):
+    folder, other = (fleet_of(tmp_path / name, 2, seed) for seed, name in enumerate("fg"))
+    drive = FleetFolder(folder).facts.drives[0].drive
+    shutil.copytree(other / "results" / drive, folder / "results" / drive, dirs_exist_ok=True)
+    assert read_made(folder, drive) is None
+    shutil.copy(other / "results" / f"{drive}.json", folder / "results")
+    os.utime(folder / "results" / drive / "summary.json", (0, 0))
+    assert finished(folder).totals != (before := finished(other)).totals
+    errors = [only(FleetFolder(f).scores, drive=drive)["ERR"] for f in (folder, other)]
+    assert errors[0].tolist() == errors[1].tolist()
+    assert before.frames
+
+
+def test_a_link_that_leads_out_of_the_folder_is_not_followed(tmp_path):
+    folder = fleet_of(tmp_path / "f", 2)
+    drive = FleetFolder(folder).facts.drives[0].drive
+    shutil.move(folder / "frames" / drive, tmp_path / "out")
+    content = (tmp_path / "out" / "frames.parquet").read_bytes()
+    (folder / "frames" / drive).symlink_to(tmp_path / "out")
+    with pytest.raises(ResultsError, match="a link leads out of the fleet's folder"):
+        FleetFolder(folder).table("frames")
+    finished(folder)
+    assert not (folder / "frames" / drive).is_symlink()
+    assert (tmp_path / "out" / "frames.parquet").read_bytes() == content
+
+
+def test_a_drive_whose_results_are_damaged_is_not_done(tmp_path):
+    folder = fleet_of(tmp_path / "f", 2)
+    drive = FleetFolder(folder).facts.drives[0].drive
+    (folder / "results" / drive / "frames.csv").write_text("drive,camera\n")
+    shutil.rmtree(folder / "scores" / drive)
+    with pytest.raises(ResultsError, match="run the fleet's command again"):
+        finished(folder)
+    assert read_made(folder, drive) is None

@@ -2,22 +2,31 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pandas as pd
 import pytest
 
+from benchmarks.slices import make_fleet
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison.compare import RegionChange
 from roadeval.evaluation.comparison.conditions import Condition
 from roadeval.evaluation.score.degradation import Degradation
+from roadeval.evaluation.stats.slices import FrameCondition, Slice
 from roadeval.results import comparison
 from roadeval.results.comparison import (
     changed_settings,
     describe_judgement,
     headline,
 )
+from roadeval.results.facts import Facts, Reason
+from roadeval.results.over_drives import slices_over_drives
 from roadeval.results.sentences import notes
-from roadeval.results.why import describe_disturbances
+from roadeval.results.tables import read_table
+from roadeval.results.why import describe_disturbances, explain
 from tests.evaluation.making import a_change, a_comparison, a_difference
+from tests.results.making import facts_of
+from tests.results.test_verdict import rates
 
 # --- Notes on a frame -----------------------------------------------------------------------------
 
@@ -154,3 +163,89 @@ def test_what_harms_most_is_told_in_one_sentence(changes, sentence):
     assert describe_disturbances({"net": changes}, "net") == sentence
     assert describe_disturbances({"net": changes}, "masks") == sentence
     assert not describe_disturbances({}, "net")
+
+
+# --- Why a variant errs: what is confirmed of its classes, conditions and disturbances ------------
+
+
+SHADE = Slice([FrameCondition("shadow", ">", 0.3)], "", 40, 0.3, 0.1, 3.0, 2.0, 4.0, 0.01, [7, 21])
+SURE = replace(a_difference(3, 1, 5), p_holm=0.002, comparisons=2)
+SHADY = "In frames with more than 30 % shade"
+FOG = {"fog-2": Degradation("fog", 2, 0.05, 0.02, SURE)}
+CLASSES = pd.DataFrame(
+    [
+        ("road", "road", 9000, 8000, 0, "8 12"),
+        ("pavement", "other", 5000, 900, 600, "50 3"),
+        ("car", "other", 4000, 300, 400, "9"),
+    ],
+    columns=["name", "truth", "pixels", "road", "beside", "worst"],
+).assign(drive="street", camera="/camera", variant="mine", frames=10, **{"class": [3, 4, 8]})
+FACTS = facts_of(
+    totals={"mine": {"post": rates(0.02)}, "blind": {"post": rates(0.1)}},
+    slices={"mine": [SHADE, replace(SHADE, part="left")]},
+    disturbances={"mine": FOG},
+)
+NO_CLASSES = read_table("classes", "")
+
+
+def test_at_most_four_sentences_name_class_condition_and_disturbance_with_their_frames():
+    assert explain(FACTS, CLASSES)["mine"] == [
+        Reason("75 % of the false road is pavement, 25 % car.", [50, 3]),
+        Reason("60 % of the missed road lies beside pavement, 40 % beside car.", [8, 12]),
+        Reason(
+            "In frames with more than 30 % shade, ERR is 3.0 times the rest (2.0 to 4.0).", [7, 21]
+        ),
+        Reason("fog:2 raises the ERR of mine from 2.0 to 5.0 % (2.5 times as high).", []),
+    ]
+    assert {*explain(FACTS, CLASSES)} == {"mine"}
+
+
+def test_masks_or_truth_that_do_not_fit_explain_enough_and_a_part_of_the_image_is_no_reason():
+    assert explain(replace(FACTS, misfits=["The truth is late."]), CLASSES) == {}
+    of_rows = replace(SHADE, conditions=[], part="rows_40-60")
+    facts = replace(FACTS, slices={"mine": [of_rows]}, disturbances={})
+    assert explain(facts, NO_CLASSES) == {}
+
+
+def test_what_may_be_chance_and_what_is_rare_is_no_reason():
+    chance = {"fog-2": replace(FOG["fog-2"], difference=replace(SURE, p_holm=0.3))}
+    facts = replace(FACTS, slices={"mine": []}, disturbances={"mine": chance})
+    assert explain(facts, NO_CLASSES) == {}
+    rare = CLASSES.assign(pixels=10**7 * (CLASSES["truth"] == "other") + CLASSES["pixels"])
+    assert (
+        explain(facts, rare.assign(road=rare["road"].where(rare["truth"] == "other", 9000))) == {}
+    )
+
+
+def test_frames_of_several_drives_are_not_named():
+    of_drives = replace(SHADE, worst=[7], drives=["lane"])
+    facts = replace(FACTS, slices={"mine": [of_drives]}, disturbances={})
+    (reason,) = explain(facts, NO_CLASSES)["mine"]
+    assert reason.frames == []
+
+
+def test_reasons_are_read_back_as_they_were_written():
+    facts = replace(FACTS, why=explain(FACTS, CLASSES))
+    assert Facts.parse(facts.text(), "here").why == facts.why
+
+
+# --- Slices over drives: tags, and times of the drive and of the day, are conditions, too ---------
+
+
+@pytest.mark.parametrize(("drives", "named"), [(40, True), (0, False)])
+def test_a_tag_of_a_drive_is_a_condition_and_a_fleet_without_drives_has_none(drives, named):
+    real = pd.DataFrame({"brightness": np.linspace(0, 1, 60)})
+    frames, conditions, parts = make_fleet(np.random.default_rng(6), [real], 40)
+    names, weathers = zip(*conditions.groupby("drive")["tag_weather"].first().items(), strict=True)
+    table = pd.DataFrame({"drive": names, "evaluated": 60, "tag_weather": weathers})[:drives]
+    frames.loc[(conditions["tag_weather"] == "rain").to_numpy(), "FP"] *= 4
+    tables = {
+        "conditions": conditions.drop(columns=["group", "tag_weather"]),
+        "frames": frames.assign(variant="net", stage="post", final=True),
+        "regions": parts.rename(columns={"wrong": "FP"}).assign(FN=0, variant="net"),
+    }
+    slices = slices_over_drives(
+        lambda name, _: tables[name], table, dict(zip(names, names, strict=True)), 0.95
+    )
+    conditions_named = [s.conditions for s in slices.get("net", [])]
+    assert ([FrameCondition("tag_weather", "is", "rain")] in conditions_named) == named

@@ -2,12 +2,14 @@
 
 import json
 import time
+from dataclasses import dataclass
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from roadeval.runtime.documents import LONGEST, read_bounded, read_json, read_toml, read_yaml
+from roadeval.runtime.settings import meanings
 from roadeval.runtime.text import UNENCODABLE, as_markdown, visible, visible_lines, without_secrets
 
 ANYTHING = st.text(st.characters(codec=None))
@@ -86,19 +88,17 @@ MANY = "y" * 1_001
         ({str(n): MANY for n in range(500)}, "its long texts have more than 500,000 letters"),
         ([0] * 101, "more than 100 values"),
         ([[[0] * 40] * 2] * 2, "more than 100 values"),
+        *((deep, "nests more than 32") for deep in ("[" * 100_000, "[" * 40 + "]" * 40)),
+        ('{"a":' * 40 + "1" + "}" * 40, "nests more than 32"),
+        ("9" * 5_000, "^a number in it has thousands of digits$"),
+        ('{"a": [1,', r"^it is no JSON, or ends early \(line 1, column 10\)$"),
+        (b'"\xff"', "^it is not in UTF-8$"),
     ],
 )
-def test_json_that_holds_too_much_is_refused(document, reason):
+def test_json_that_is_damaged_or_holds_too_much_is_refused_in_plain_words(document, reason):
+    text = document if isinstance(document, str | bytes) else json.dumps(document)
     with pytest.raises(ValueError, match=reason):
-        read_json(json.dumps(document), 100 if "values" in reason else 10_000)
-
-
-@pytest.mark.parametrize(
-    "deep", ["[" * 100_000, "[" * 40 + "]" * 40, '{"a":' * 40 + "1" + "}" * 40]
-)
-def test_json_that_nests_too_deep_is_refused(deep):
-    with pytest.raises(ValueError, match="nests more than 32"):
-        read_json(deep)
+        read_json(text, **({"values": 100} if "values" in reason else {}))
 
 
 def test_what_is_written_is_read():
@@ -129,19 +129,6 @@ def test_toml_that_holds_too_much_is_refused_at_once(text, reason):
     assert time.process_time() - begun < 2
 
 
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("9" * 5_000, "a number in it has thousands of digits"),
-        ('{"a": [1,', r"it is no JSON, or ends early \(line 1, column 10\)"),
-        (b'"\xff"', "it is not in UTF-8"),
-    ],
-)
-def test_json_that_is_damaged_is_told_in_plain_words(text, reason):
-    with pytest.raises(ValueError, match=f"^{reason}$"):
-        read_json(text)
-
-
 def test_a_document_is_a_file_that_ends(tmp_path):
     (tmp_path / "large").write_bytes(bytes(65 << 20))
     with pytest.raises(ValueError, match="at most 67,108,864 are read"):
@@ -155,3 +142,37 @@ def test_yaml_whose_values_are_not_of_their_tags_is_damaged(tmp_path, text):
     (tmp_path / "camera.yaml").write_text(text)
     with pytest.raises(ValueError, match="it is damaged"):
         read_yaml(tmp_path / "camera.yaml")
+
+
+# --- The meaning of settings, as help texts and documented configurations show it -----------------
+
+
+@dataclass
+class Base:
+    """Settings of a base.
+
+    least: The least
+        number.
+    note: This is no field, and so no setting.
+    """
+
+    least: int = 1
+
+
+@dataclass
+class More(Base):
+    """More settings.
+
+    greatest: A number: ``least`` or more.
+    """
+
+    greatest: int = 2
+    undescribed: int = 3
+
+
+def test_the_docstring_of_a_class_and_of_its_bases_describes_their_fields():
+    """Also of a class whose source is nowhere."""
+    described = {"least": "The least number.", "greatest": "A number: ``least`` or more."}
+    assert meanings(More) == described
+    parts = {"__doc__": "Made.\n\n    seed: A seed.\n", "__annotations__": {"seed": int}}
+    assert meanings(type("Made", (More,), parts)) == {**described, "seed": "A seed."}

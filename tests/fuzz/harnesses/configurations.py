@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import tomlkit
 
-from roadeval.config.run import config_toml, configure, load_config, run_toml
+from roadeval import config_toml, configure, load_config
+from roadeval.config.run import run_toml
 from roadeval.config.variants import PRESETS
 from tests.config.test_config import OTHER, tables
 from tests.fuzz.harness import Harness, scratch

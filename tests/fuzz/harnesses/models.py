@@ -6,9 +6,8 @@ import io
 import zipfile
 from functools import cache
 
-from roadeval.config.run import configure
+from roadeval import configure, save_model
 from roadeval.training.learning import fit, from_file
-from roadeval.training.model import save_model
 from roadeval.training.settings import TrainingSettings
 from tests.compatibility.make import MODEL, unpack, versions
 from tests.fuzz.harness import Harness, scratch

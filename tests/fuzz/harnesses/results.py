@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from roadeval.config.run import load_config
-from roadeval.errors import RoadevalError
+from roadeval import Recording, RoadevalError, load_config
 from roadeval.jobs.results.report import collect
 from roadeval.jobs.results.result import DriveResult
-from roadeval.recording.recording import Recording
 from roadeval.report import figures
 from roadeval.report.document import document
 from roadeval.results.folder import RUN

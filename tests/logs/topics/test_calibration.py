@@ -364,14 +364,11 @@ def test_a_camera_frame_with_the_axes_of_a_vehicle_is_read_so(tmp_path: Path):
     assert (of_body.frame_id, of_optical.frame_id) == ("cam_optical", "cam")
 
 
-def test_transforms_that_cannot_be_read_are_said(tmp_path: Path):
+def test_transforms_and_a_calibration_that_cannot_be_read_are_said(tmp_path: Path):
     messages = [foxglove_lens(), ("/tf_static", "foxglove.FrameTransform", {"x": 1}), picture()]
     lens, why = lens_in(foxglove(tmp_path / "a.mcap", messages))
     assert lens is not None
     assert why == "its place is not known: /tf_static cannot be read"
-
-
-def test_a_calibration_that_cannot_be_read_is_said(tmp_path: Path):
     topic, name, content = foxglove_lens()
     path = foxglove(tmp_path / "a.mcap", [(topic, name, {**content, "K": None}), picture()])
     why = "its json messages of foxglove.CameraCalibration cannot be read: give its lens with"

@@ -31,12 +31,9 @@ def other(name: str) -> TopicInfo:
     return TopicInfo(name, "sensor_msgs/msg/Imu", "cdr", TopicKind.OTHER, 5)
 
 
-def test_labels_and_masks_are_no_cameras() -> None:
+def test_labels_and_masks_are_no_cameras_and_depth_is_one_where_there_is_nothing_else() -> None:
     topics = [camera("/cam"), label("/labels/semantic"), label("/road_mask"), label("/shadowMask")]
     assert choose_image(topics, None)[0].name == "/cam"
-
-
-def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
     depth = TopicInfo("/cam/depth", "Image", "cdr", TopicKind.IMAGE, 5, format="16UC1", channels=1)
     assert choose_image([camera("/cam/rgb"), depth], None)[0].name == "/cam/rgb"
     assert choose_image([depth], None)[0].name == "/cam/depth"

@@ -17,11 +17,11 @@ from roadeval.logs.settings import LabelPlace, LabelSettings, LogConfig, TopicSe
 from roadeval.logs.truth.formats.coco import lengths_in
 from roadeval.logs.truth.label_files import GREATEST, labels_in
 from roadeval.logs.truth.meaning import label_files
-from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.sentence import Setting
 from tests.e2e.commands import here
+from tests.fixtures.logged import write_drive
 from tests.fixtures.shared import shared
-from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
+from tests.logs.making import compressed, grey, jpeg, raw, ros2_log
 from tests.logs.truth.test_folder import opened
 from tests.logs.truth.test_formats import LABELS, SIZE
 
@@ -35,11 +35,10 @@ LOWER[16:] = 255
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("drive") / "drive.mcap"
-    with LogWriter(path) as writer:
-        for number in range(FRAMES):
-            noise = np.random.default_rng(number).integers(0, 256, (32, 48, 3), np.uint8)
-            writer.image("/camera", START + number * STEP, png(noise), "png")
-    return path
+    noise = [
+        np.random.default_rng(n).integers(0, 256, (32, 48, 3), np.uint8) for n in range(FRAMES)
+    ]
+    return write_drive(path, ((START + n * STEP, {"/camera": i}) for n, i in enumerate(noise)))
 
 
 def images(folder: Path, *names: str, pixels=LOWER) -> Path:

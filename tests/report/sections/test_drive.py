@@ -1,6 +1,11 @@
 """The parts of a drive's report: what each says where numbers lack or cannot be sure."""
 
+import json
 import math
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -8,8 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import roadeval.report
+from roadeval import Result, write_report
 from roadeval.data import ERRORS
 from roadeval.evaluation.score.scoreboard import Effect
+from roadeval.evaluation.stats.slices import FrameCondition, Slice
 from roadeval.evaluation.tables import windows
 from roadeval.report.blocks import (
     Cell,
@@ -24,17 +32,21 @@ from roadeval.report.blocks import (
     TwoColumns,
     plain,
 )
-from roadeval.report.captions import caption
+from roadeval.report.captions import caption, captions
 from roadeval.report.charts import standard as charts
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
+from roadeval.report.sections import drive, drives, summary
 from roadeval.report.sections.drive import filter_effect, over_drive, regions, thresholds
 from roadeval.report.sections.frames import FrameBrowser, notable_frame, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
+from roadeval.report.sections.slices import when_it_fails
 from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import differences_table, rates_table, stages_table
-from roadeval.results.facts import TrainingFacts
+from roadeval.results.facts import Facts, FrameAccount, TrainingFacts
+from roadeval.results.fleet import FleetFolder
+from roadeval.results.schema import FAILED, SCORED
 from roadeval.results.tables import read_table
 from tests.evaluation.making import a_table
 from tests.report.making import (
@@ -44,10 +56,14 @@ from tests.report.making import (
     by_rate,
     column,
     opened,
+    plain_rows,
     rates,
     some_findings,
+    text,
     the,
 )
+from tests.results.fleet.making import fleet_of
+from tests.results.making import facts_of
 
 
 def texts(findings):
@@ -178,16 +194,13 @@ def bold(table, title):
     return [cell.text for cell in column(table, title) if cell.bold]
 
 
-def test_an_undefined_rate_is_never_the_best():
-    findings = some_findings()
-    findings.facts.totals["filtered"]["post"]["ERR"] = math.nan
-    assert bold(rates_table(findings.facts), "ERR") == ["12.00"]
-
-
 ALONE = {"filtered": {"post": a_total(0.1)}}
 
 
-def test_undefined_rates_are_told_and_how_often():
+def test_undefined_rates_are_never_the_best_and_told_and_how_often():
+    findings = some_findings()
+    findings.facts.totals["filtered"]["post"]["ERR"] = math.nan
+    assert bold(rates_table(findings.facts), "ERR") == ["12.00"]
     undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
     totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
     assert list(warnings(some_findings(totals=totals))) == [
@@ -318,3 +331,171 @@ def test_without_truth_the_final_masks_are_large_and_of_the_steps_those_of_one_v
     grids = [b for b in notable_frame(some_findings(), shown) if isinstance(b, ImageGrid)]
     titles = [[title for title, _ in grid.pictures] for grid in grids]
     assert titles == [["camera", "a: road", "b: road"], ["a: svm"]]
+
+
+# --- When a mask fails: what a report says of slices that hold, of none, and of too few frames ----
+
+
+SHADE = Slice(
+    *([FrameCondition("shadow", ">", 0.3)], "20-80m", 45, 0.31, 0.1, 3.1, 1.8, 4.9, 0.01, [12, 40])
+)
+
+
+def blocks(frames: int = 90, level: int = 1, **slices: list[Slice]):
+    account = FrameAccount(evaluated=frames)
+    return [*when_it_fails(some_findings(slices=slices, frames=account), level)]
+
+
+def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
+    section = blocks(filtered=[SHADE])
+    assert section[1].text == (
+        "In frames with more than 30 % shade, 20 to 80 m ahead, ERR is 3.1 times the rest "
+        "(1.8 to 4.9)."
+    )
+    place = "in frames with more than 30 % shade, 20 to 80 m ahead"
+    row = [place, "45", "31.00", "10.00", "3.1 (1.8 to 4.9)", "12, 40"]
+    assert plain_rows(the(Table, section)) == [row]
+    assert the(Table, section).rows[0][-1].frames == [12, 40]
+    assert not the(Table, blocks(level=2, filtered=[SHADE])).rows[0][-1].frames
+
+
+@pytest.mark.parametrize(
+    ("frames", "slices", "begin"),
+    [(90, {"filtered": []}, "Nothing is confirmed."), (39, {}, "Too little")],
+)
+def test_where_no_slice_holds_a_sentence_says_so(frames, slices, begin):
+    heading, sentence = blocks(frames, **slices)
+    assert isinstance(heading, Heading)
+    assert isinstance(sentence, Text)
+    assert sentence.text.startswith(begin)
+
+
+def test_a_result_in_which_nothing_was_searched_has_no_section():
+    assert blocks(90) == []
+
+
+@pytest.mark.parametrize("slices", [{}, {"mine": []}, {"mine": [SHADE, replace(SHADE, part="")]}])
+def test_slices_are_read_back_as_they_were_written(slices):
+    facts = Facts.parse(facts_of(slices=slices).text(), "here")
+    assert facts.slices == slices
+    assert ("slices" in json.loads(facts.text())) == bool(slices)
+
+
+def test_drives_of_one_day_count_as_one(tmp_path):
+    fleet = FleetFolder(fleet_of(tmp_path / "week", 14, status=lambda _: SCORED))
+    fleet.drives["group"] = fleet.drives["drive"]
+    assert [*when_it_fails(fleet)] == []  # made before conditions were measured
+    fleet.drives["group"] = "monday"
+    _, sentence = when_it_fails(fleet)
+    assert sentence.text.startswith("Too little")
+    assert sentence.text.endswith("needs 12 groups of drives.")
+
+
+# --- The report of a fleet: what it says, and how it grows ----------------------------------------
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Twelve drives: one failed, one is without truth, one has lost a part."""
+    return fleet_of(tmp_path_factory.mktemp("fleet") / "street", 12, pictures=12)
+
+
+@pytest.fixture(scope="module")
+def fleet(folder):
+    return FleetFolder(folder)
+
+
+def opened_blocks(section, fleet):
+    return opened(section(fleet))
+
+
+def tables(section, fleet):
+    return [block for block in opened_blocks(section, fleet) if isinstance(block, Table)]
+
+
+def test_the_first_page_has_the_verdict_the_rates_and_the_differences(fleet):
+    told = opened_blocks(summary.section, fleet)
+    assert fleet.facts.verdict in [b.text for b in told if isinstance(b, Text)]
+    rates, effects = tables(summary.section, fleet)
+    assert [row[0] for row in plain_rows(rates)] == ["filtered", "unfiltered", "blind"]
+    first, *others = (own["post"] for own in fleet.facts.totals.values())
+    assert plain_rows(rates)[0][1:4] == ["10", "200", f"{100 * first['ERR']:.2f}"]
+    bold = [cell.text for row in rates.rows for cell in row[3:4] if cell.bold]
+    assert bold == [f"{100 * min(r['ERR'] for r in (first, *others)):.2f}"]
+    assert plain_rows(effects)[0][0] == "filtered \N{MINUS SIGN} unfiltered"
+    assert len(effects.rows) == 3
+    assert effects.groups[-1] == ("drives", 2)
+
+
+def test_the_regions_of_all_drives_are_drawn(fleet):
+    (figure,) = (each for each in opened_blocks(drive.regions, fleet) if isinstance(each, Figure))
+    final = Result(fleet.path).scores.query("final and region != 'all'")
+    sums = final.groupby(["variant", "region"])[["FP", "FN", "N"]].sum()
+    assert len(figure.charts[0].names) == fleet.regions.index.unique("region").size > 0
+    for (region, variant), own in fleet.regions.iterrows():
+        counted = sums.loc[(variant, region)]
+        assert own["ERR"] == pytest.approx((counted.FP + counted.FN) / counted.N)
+
+
+def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, fleet, tmp_path):
+    grid = the(
+        ImageGrid, [b for b in opened_blocks(drives.worst, fleet) if isinstance(b, ImageGrid)]
+    )
+    assert len(grid.pictures) == 12
+    first = fleet.worst.iloc[0]
+    name = f"{fleet.names[first['drive']]}, frame {first['frame']}"
+    assert grid.pictures[0][0].startswith(f"1. {name}")
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    picture = copy / "pictures" / first["drive"] / f"{first['frame']}.jpg"
+    picture.write_bytes(picture.read_bytes()[:50])
+    told = opened_blocks(drives.worst, (FleetFolder(copy)))
+    assert len(told[1].pictures) == 11
+    assert "Not in the folder: 1 picture." in told[2].text
+
+
+def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):
+    path = write_report(folder)
+    assert path == folder / "report.pdf"
+    first = path.read_bytes()
+    assert "What the filter changes" in text(first)
+    assert write_report(folder).read_bytes() == first
+
+
+def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path):
+    fleet = fleet_of(tmp_path / "f", 2, status=lambda _: FAILED)
+    told = text(write_report(fleet).read_bytes())
+    assert "Drives that failed: 2" in told
+    assert "Nothing to score: no frame with truth was evaluated." in told
+
+
+def test_two_drives_of_one_name_are_told_apart(folder, tmp_path):
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    found = FleetFolder(copy)
+    drives_ = [replace(each, name="same") for each in found.facts.drives]
+    assert len({each.drive for each in drives_}) == 12
+    (copy / "fleet.json").write_text(replace(found.facts, drives=drives_).text())
+    names = (FleetFolder(copy)).names
+    assert len(set(names.values())) == 12
+
+
+# --- The captions in Markdown, and the code that shows them ---------------------------------------
+
+
+FOLDER = Path(roadeval.report.__file__).parent
+PYTHON, TEMPLATES = (
+    "\n".join(path.read_text("utf-8") for path in sorted(FOLDER.rglob(pattern)))
+    for pattern in ("*.py", "*.html")
+)
+
+
+def test_every_caption_is_shown_and_every_shown_one_is_there() -> None:
+    code = (PYTHON + TEMPLATES).replace("'", '"')
+    assert [name for name in captions() if f'"{name}"' not in code] == []
+    shown = re.findall(r'\b(?:caption|note)\(\s*"([^"]+)"', code)
+    assert {*shown} <= captions().keys()
+
+
+def test_a_caption_is_one_line_with_its_values() -> None:
+    assert caption("units") == "Percent; the differences in percentage points."
+    assert caption("failed drives", failed=2, drives=9).startswith("2 of 9 drives failed")
+    assert not any("\n" in words for words in captions().values())
