@@ -186,6 +186,7 @@ class _RemoteFile(FarFile):
         return self._at
 
     def read(self, size: int) -> bytes:
+        """Read at most so many bytes; a `FleetError` if the server sends others."""
         begin, end, content = self._at, min(self._at + size, self._size), bytearray()
         self._at = max(begin, end)
         while begin < end:
@@ -195,6 +196,7 @@ class _RemoteFile(FarFile):
         return bytes(content)
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
+        """Ask for the first parts that are not held; near ones are one, large ones several."""
         asked, expected = [part for part in self._parts if part.answer], list[_Part]()
         held = sorted((part.begin, part.end) for part in asked)
         for begin, stop in dict.fromkeys(parts):

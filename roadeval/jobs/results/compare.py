@@ -85,19 +85,8 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths = [local_path(path) for path in list_paths(results)]
-    if not paths:
-        raise RoadevalError("nothing to compare: name one result, or several")
+    paths, unread = _choose_paths(results, on_progress)
     across = len(paths) == 1
-    unread: Sequence[str] = ()
-    if across and len(paths := find_results(folder := paths[0])) > 1:
-        raise RoadevalError(
-            f"holds {len(paths)} results",
-            where=folder,
-            remedy="name behind it the result to hold against them, or use 'roadeval history'",
-        )
-    if not across:
-        paths[0], unread = last_good(paths[0], paths[1:], on_progress)
     opened = [Result(path) for path in paths]
     if across:
         opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
@@ -132,6 +121,26 @@ def compare(
     }
     judgements = tuple(judge(comparison, conditions, settings))
     return Compared(comparison, judgements, tuple(alone or ()), recordings, tuple(lost))
+
+
+def _choose_paths(results: Paths, on_progress: OnProgress) -> tuple[list[Path], Sequence[str]]:
+    """Return the paths of the results, the base first, and why runs beside it cannot be read.
+
+    A `RoadevalError` if there is none, or only a folder of several results.
+    """
+    paths = [local_path(path) for path in list_paths(results)]
+    if not paths:
+        raise RoadevalError("nothing to compare: name one result, or several")
+    if len(paths) > 1:
+        base, unread = last_good(paths[0], paths[1:], on_progress)
+        return [base, *paths[1:]], unread
+    if len(there := find_results(paths[0])) > 1:
+        raise RoadevalError(
+            f"holds {len(there)} results",
+            where=paths[0],
+            remedy="name behind it the result to hold against them, or use 'roadeval history'",
+        )
+    return there, ()
 
 
 def _failure_sentence(result: Result) -> str:

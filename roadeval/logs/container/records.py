@@ -120,7 +120,10 @@ class FileBytes:
         return self._size - self._at
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
-        """Say which parts will be read next, in this order: a `FarFile` reads them ahead."""
+        """Announce the parts that are read next, in this order, so that a `FarFile` reads ahead.
+
+        Each is a first byte and the byte behind its last.
+        """
         if isinstance(self._file, FarFile):
             self._file.expect((self.begin + begin, self.begin + end) for begin, end in parts)
 

@@ -323,7 +323,7 @@ class TopicReader:
                 yield begin + data.data_offset, begin + data.data_end
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
-        """Say which bytes of its file will be read next, see `FileBytes.expect`."""
+        """Announce the bytes of the file that are read next, as `FileBytes.expect` does."""
         self._files[0].source.expect(parts)
 
     def chunks_of(self, positions: Sequence[int]) -> int:
