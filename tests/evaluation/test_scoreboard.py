@@ -179,6 +179,18 @@ def test_claims_are_counted_apart_in_full_windows_and_shorter_ones():
     assert evidence(pd.DataFrame(columns=["variant", "stage"]), 10) == {}
 
 
+@pytest.mark.parametrize("sizes", [(10, 9), (9, 10)])
+def test_a_window_is_full_if_both_masks_have_all_its_frames(sizes):
+    masks = zip(("filtered", "unfiltered"), sizes, (0.1, 0.2), strict=True)
+    rows = [
+        {"window": 0, "frames": size, "variant": name, "stage": "post"}
+        | dict.fromkeys(("ERR", "FPR", "FNR"), err)
+        for name, size, err in masks
+    ]
+    counts = evidence(table_of("windows", rows), 10)["filter_ERR"]
+    assert counts == {"held": 0, "windows": 0, "short_held": 1, "short": 1}
+
+
 def variant(name, mask, codes=None):
     output = Output(mask=Packed.of(mask), probability=codes)
     return VariantResult(name, (StageResult("post", output, 0.0),))
