@@ -28,6 +28,18 @@ def _labels(labels: object) -> object:
     return labels
 
 
+def _spare(tables: object) -> object:
+    """Return names of tables of a drive that its results can do without."""
+    from roadeval.results.schema import OF_A_DRIVE
+
+    spare = [name for name in OF_A_DRIVE if name not in ("frames", "windows")]
+    if not isinstance(tables, list | tuple):
+        return tables
+    if not {*map(str, tables)} <= {*spare}:
+        raise ValueError(f"must be some of {', '.join(spare)}")
+    return tuple(tables)
+
+
 @dataclass(frozen=True)
 class OutputSettings:
     """Where the results of a run are written, and which images are recorded.
@@ -43,6 +55,9 @@ class OutputSettings:
         that you bring, else ``filtered``.
     labels: Label of the results, as branch=main, which changes no number.
     figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
+    packed: Whether tables are compressed, as ``frames.csv.gz``. Those of a fleet's drives always
+        are.
+    without: Tables to leave out, as ``heat`` or ``regions``, with what a report makes of them.
     """
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
@@ -54,6 +69,8 @@ class OutputSettings:
         default_factory=dict
     )
     figures: bool = True
+    packed: bool = False
+    without: Annotated[tuple[str, ...], Checked(_spare)] = ()
 
 
 @dataclass(frozen=True)

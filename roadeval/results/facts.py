@@ -239,9 +239,9 @@ class FactsFile:
         """Return the parts of a file as the fields have them."""
         return content
 
-    def text(self) -> str:
-        """Return the text of the file."""
-        return json_text(self.as_dict())
+    def text(self, *, packed: bool = False) -> str:
+        """Return the text of the file, one line without spaces if ``packed``."""
+        return json_text(self.as_dict(), packed=packed)
 
     @classmethod
     def parse(cls, text: str | bytes, where: object) -> Self:
@@ -541,9 +541,13 @@ def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any
     return {"parts": covered, "sha256": hashlib.sha256(text.encode()).hexdigest()}
 
 
-def json_text(value: Any) -> str:
-    """Return a value of JSON as the text of a file; invisible characters are escaped."""
-    return visible_lines(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+def json_text(value: Any, *, packed: bool = False) -> str:
+    """Return a value of JSON as the text of a file, indented, or one line without spaces.
+
+    Invisible characters are escaped.
+    """
+    form = {"separators": (",", ":")} if packed else {"indent": 2}
+    return visible_lines(json.dumps(value, ensure_ascii=False, allow_nan=False, **form)) + "\n"
 
 
 def plain(value: Any) -> Any:

@@ -5,6 +5,7 @@ It is built beside the one of its name, and replaces it as one: see `roadeval.ru
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 RUN: Final = "run.toml"
 """The configuration file that repeats the run."""
+CSV: Final = ".csv"
+PACKED: Final = ".csv.gz"
+"""Endings of a table's file: as text, and compressed."""
 NAME_BYTES: Final = 255
 """Greatest length of a file's name on common file systems."""
 
@@ -39,7 +43,8 @@ def names_of_results(summary: Path) -> frozenset[str]:
     # A summary may list anything: names that no file of the folder can have are left out.
     plain = [name for name in names if Path(name).name == name != ".." and name.isprintable()]
     listed_files = {name for name in plain if len(name.encode()) <= NAME_BYTES}
-    return frozenset(listed_files) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
+    tables = (f"{table}{ending}" for table in OF_A_DRIVE for ending in (CSV, PACKED))
+    return frozenset(listed_files) | {SUMMARY, RUN, *tables}
 
 
 CONTENT: Final = Content(SUMMARY, names_of_results)
@@ -51,11 +56,13 @@ class ResultsWriter:
 
     The folder takes its name at the end of the context if `finish` was called. After an exception,
     or without `finish`, it is removed, and earlier results stay. Every method raises a
-    `ResultsError` if the folder cannot be written to.
+    `ResultsError` if the folder cannot be written to. If ``packed``, tables are compressed, and
+    the summary is one line.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, packed: bool = False) -> None:
         self._new = NewFolder(folder, CONTENT)
+        self._packed = packed
         self._open: dict[str, _Growing] = {}
         self._finished = False
 
@@ -68,7 +75,7 @@ class ResultsWriter:
         with self.explain_errors():
             self._new.begin()
             for name in OF_A_DRIVE:
-                self._open[name] = _Growing(self.folder, TABLES[name])
+                self._open[name] = _Growing(self.folder, TABLES[name], self._packed)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -106,7 +113,7 @@ class ResultsWriter:
             (self.folder / RUN).write_bytes(run_toml.encode())
             names = sorted({SUMMARY, *(path.name for path in self.folder.iterdir())})
             facts = replace(facts, tables=self.tables, files=names)
-            (self.folder / SUMMARY).write_bytes(facts.text().encode())
+            (self.folder / SUMMARY).write_bytes(facts.text(packed=self._packed).encode())
         self._finished = True
         return facts
 
@@ -119,9 +126,10 @@ class ResultsWriter:
 class _Growing:
     """A table to which lines are appended."""
 
-    def __init__(self, folder: Path, table: TableSchema) -> None:
-        self.path = folder / f"{table.name}.csv"
-        self.file = self.path.open("wb")
+    def __init__(self, folder: Path, table: TableSchema, packed: bool) -> None:
+        self.path = folder / f"{table.name}{PACKED if packed else CSV}"
+        # Without the time of writing, equal tables are equal files.
+        self.file = gzip.GzipFile(self.path, "wb", 6, mtime=0) if packed else self.path.open("wb")
         self.rows = -1  # the header is no row
         self._digest = hashlib.sha256()
         self.append(table.header)
@@ -156,5 +164,6 @@ class ResultsFolder:
         A table that was not written is empty. A `ResultsError` if it is damaged, or not the one
         that the summary states.
         """
-        path = self._folder / f"{name}.csv"
+        packed = f"{name}{PACKED}"
+        path = self._folder / (packed if packed in self._facts_of_all.files else f"{name}{CSV}")
         return read_table(name, path, self._facts_of_all.tables, self._camera)

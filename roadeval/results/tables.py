@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
+import zlib
 from collections.abc import Collection, Container, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -29,7 +31,8 @@ NAMED: Final = 40
 ROWS: Final = 10_000
 """Rows that a Parquet file of any size may have; more rows need at least a byte each."""
 UNPACKED: Final = 256 << 20
-"""Bytes that a Parquet file of any size may unpack to; a larger file may to 100 times its size."""
+"""Bytes that a compressed file of any size may unpack to; a larger file may to 100 times its size.
+"""
 COLUMNS: Final = 1_000
 WORDS: Final = 1_000
 """Different names in a column of a drive's table: variants, stages, regions; ten times as many
@@ -58,21 +61,24 @@ def read_table(
 ) -> pd.DataFrame:
     """Read a table of a drive bit-exactly, and check that it is complete.
 
-    ``name`` is one of `roadeval.results.schema.TABLES`; ``source`` is a CSV file, or its text with
-    the header line. A file that does not exist has no rows, like an empty text. ``stated`` are the
-    facts that the summary states of each table, by name: a table that it does not state must be
-    empty. It is None if there is no summary. With ``camera`` only the rows of that camera are
-    returned. Names are categoricals of text, even if they look like numbers; rates are float64, all
-    other numbers int64. A `ResultsError` if the table is damaged, or not the one that is stated.
+    ``name`` is one of `roadeval.results.schema.TABLES`; ``source`` is a CSV file, which may be
+    compressed with gzip, or its text with the header line. A file that does not exist has no rows,
+    like an empty text. ``stated`` are the facts that the summary states of each table, by name: a
+    table that it does not state must be empty. It is None if there is no summary. With ``camera``
+    only the rows of that camera are returned. Names are categoricals of text, even if they look
+    like numbers; rates are float64, all other numbers int64. A `ResultsError` if the table is
+    damaged, or not the one that is stated.
     """
     table = TABLES[name]
     where = source if isinstance(source, Path) else f"the recording's table {name}"
     try:
         if isinstance(source, Path):
             check_input(source)
-        content = source.encode() if isinstance(source, str) else source.read_bytes()
+        content = source.encode() if isinstance(source, str) else _read_csv(source)
     except FileNotFoundError:
         content = b""
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise ResultsError(f"{where}: damaged ({error}); {_ANEW}") from error
     except OSError as error:
         raise ResultsError(f"{where}: {error.strerror}") from error
     if stated is not None:
@@ -86,6 +92,18 @@ def read_table(
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
     return rows[rows["camera"] == camera] if camera else rows
+
+
+def _read_csv(path: Path) -> bytes:
+    """Read a file, of a compressed one what it unpacks to, if that is not far too much."""
+    if path.suffix != ".gz":
+        return path.read_bytes()
+    most = UNPACKED + 100 * path.stat().st_size
+    with gzip.open(path) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise gzip.BadGzipFile(f"it unpacks to more than {most:,} bytes")
+    return content
 
 
 def _check_stated(where: Path | str, content: bytes, stated: TableFacts | None) -> None:
@@ -174,12 +192,16 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str 
             files.append(NewFile(path))
             stack.callback(files[-1].discard)
             files[-1].begin()
-            # Pages have checksums, for Arrow's ZSTD has none.
+            # Pages have checksums, for Arrow's ZSTD has none. Of short tables the statistics,
+            # dictionaries of numbers, and Arrow's own copy of the schema would be two fifths.
             parquet.write_table(
                 made.cast(schema).replace_schema_metadata(about),
                 files[-1].partial,
                 compression="zstd",
                 write_page_checksum=True,
+                write_statistics=False,
+                use_dictionary=[field.name for field in schema if field.type == pa.string()],
+                store_schema=False,
             )
         for file in files:
             file.publish()

@@ -106,6 +106,32 @@ def test_without_a_recording_the_tables_are_the_same(drive, once, tmp_path):
     assert frames == (once[0] / "reports" / "frames.csv").read_bytes()
 
 
+SPARE = sorted({*TABLES} - {"frames", "windows"})
+"""Tables that results can do without."""
+
+
+def test_tables_that_are_left_out_cost_a_report_their_parts_alone(drive, once, tmp_path):
+    folder, _ = once
+    run(drive, tmp_path, disturb=["noise:1", "fog:2"], output={"without": SPARE, "packed": True})
+    files = {path.name for path in (tmp_path / "reports").glob("*.csv*")}
+    assert files == {"frames.csv.gz", "windows.csv.gz"}
+    for result in (tmp_path / "out.rrd", tmp_path / "reports"):
+        pd.testing.assert_frame_equal(
+            roadeval.Result(result).table("frames"),
+            roadeval.Result(folder / "reports").table("frames"),
+        )
+        assert all(roadeval.Result(result).table(name).empty for name in SPARE)
+        for ending in ("html", "pdf"):
+            roadeval.write_report(result, tmp_path / f"report.{ending}")
+    roadeval.compare([tmp_path / "reports", folder / "reports"])
+
+
+def test_a_table_that_results_cannot_do_without_is_not_left_out(drive):
+    for name in ("frames", "windows", "scores", "x"):
+        with pytest.raises(RoadevalError, match=r"^`output\.without`: must be some of regions, "):
+            settings(output={"without": ["heat", name]})
+
+
 def test_time_commit_and_labels_are_in_the_summary_and_not_in_the_recording(
     drive, once, tmp_path, monkeypatch
 ):

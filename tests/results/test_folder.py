@@ -1,17 +1,19 @@
 """The results folder and its facts: what is written is read, and nothing half-done stays."""
 
+import gzip
 import hashlib
 import json
 import math
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from pyarrow import parquet
 
@@ -22,6 +24,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import only
 from roadeval.geometry.ground import ground_of
 from roadeval.geometry.settings import GroundSettings
+from roadeval.results import tables
 from roadeval.results.facts import Facts, FrameAccount, LogFacts, digest_of
 from roadeval.results.fleet import FleetFolder, FleetWriter, Made, cached_path, read_made
 from roadeval.results.folder import ResultsFolder, ResultsWriter, names_of_results
@@ -67,9 +70,9 @@ def the_rest(board: Scoreboard) -> Facts:
     return facts_of(frames=account, effects=sums.effects, **sums.parts)
 
 
-def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
+def write(folder: Path, role: Role = Role.EVALUATED, *, packed: bool = False) -> list[Path]:
     board = a_board()
-    with ResultsWriter(folder) as writer:
+    with ResultsWriter(folder, packed=packed) as writer:
         for result in scored(board, role):
             writer.append(lines(result))
         writer.append(sum_lines(board, board.summary().windows))
@@ -159,6 +162,55 @@ def test_a_table_with_one_number_changed_is_refused(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("filtered,0,0,8,23", "filtered,0,0,8,24"))
     with pytest.raises(ResultsError, match=r"summary \(its content differs\)"):
         ResultsFolder(tmp_path).table("heat")
+
+
+def test_packed_results_are_the_same_results(tmp_path: Path) -> None:
+    write(tmp_path / "plain")
+    for folder in ("packed", "again"):
+        write(tmp_path / folder, packed=True)
+    plain, packed = (ResultsFolder(tmp_path / name) for name in ("plain", "packed"))
+    assert packed.facts.tables == plain.facts.tables
+    for table in OF_A_DRIVE:
+        content = (tmp_path / "packed" / f"{table}.csv.gz").read_bytes()
+        assert gzip.decompress(content) == (tmp_path / "plain" / f"{table}.csv").read_bytes()
+        assert content == (tmp_path / "again" / f"{table}.csv.gz").read_bytes()
+        pd.testing.assert_frame_equal(packed.table(table), plain.table(table))
+    assert not list((tmp_path / "packed").glob("*.csv"))
+    texts = [(tmp_path / name / "summary.json").read_text() for name in ("packed", "plain")]
+    summaries = [json.loads(text) | {"files": None} for text in texts]
+    assert summaries[0] == summaries[1]
+    assert texts[0].count("\n") == 1
+    assert len(texts[0]) < 0.8 * len(texts[1])
+
+
+def test_plain_results_replace_packed_ones_and_packed_ones_plain_ones(tmp_path: Path) -> None:
+    for packed in (True, False, True):
+        files = write(tmp_path, packed=packed)
+        assert names(tmp_path) == {path.name for path in files}
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda content: content[:-9], "end-of-stream marker"),
+        (lambda content: content[:40] + bytes(9) + content[49:], "damaged"),
+        (lambda content: content[:-4] + b"abcd", "length"),
+        (lambda _: b"frame,drive\n", "Not a gzipped file"),
+        (lambda _: gzip.compress(bytes(3_000_000)), "it unpacks to more than"),
+    ],
+)
+def test_a_damaged_packed_table_is_one_line(
+    damage: Callable[[bytes], bytes], reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tables, "UNPACKED", 1 << 20)
+    write(tmp_path, packed=True)
+    path = tmp_path / "frames.csv.gz"
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(ResultsError) as caught:
+        ResultsFolder(tmp_path).table("frames")
+    assert str(caught.value).startswith(f"{path}: damaged (")
+    assert reason in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:

@@ -199,6 +199,8 @@ def _try_replay(task: DriveTask) -> Made:
         record=record,
         focus=task.focus,
         figures=False,
+        packed=True,
+        without=task.config.output.without,
     )
     alone = replace(task.config.run, jobs=1)
     pictures = WorstPictures(task.focus)

@@ -9,7 +9,7 @@ import platform
 import re
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -37,7 +37,7 @@ from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import AbsentError, MisfitError, StageError, View
 from roadeval.recording.layout import FOXGLOVE_TIME, HEADER_TIME, Layout
 from roadeval.results.facts import focus_of
-from roadeval.results.rows import Key, condition_rows, csv_lines, doubt_rows, frame_rows
+from roadeval.results.rows import Key, Row, condition_rows, csv_lines, doubt_rows, frame_rows
 from roadeval.results.schema import STREAMED, TABLES
 from roadeval.results.sentences import notes_of
 from roadeval.runtime import discovery
@@ -177,8 +177,13 @@ class Run:
         for failure in done.failures:
             self.failures.add(failure)
         rows = doubt_rows(done.result.frame, doubts)
-        lines = csv_lines(self.key, rows | condition_rows(done.result, self.board.conditions.last))
+        lines = self.csv_lines(rows | condition_rows(done.result, self.board.conditions.last))
         return replace(done, lines={**done.lines, **lines})
+
+    def csv_lines(self, rows: Mapping[str, Iterable[Row]]) -> dict[str, str]:
+        """Return the lines of CSV of the tables that have rows and are not left out."""
+        without = self.config.output.without
+        return csv_lines(self.key, {name: rows[name] for name in rows if name not in without})
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""
@@ -315,8 +320,9 @@ COMPUTING: Final = (
 
 
 def deciding(config: RunConfig) -> RunConfig:
-    """Return a configuration without settings that change no number: output paths and workers."""
-    output = OutputSettings(record=config.output.record, focus=config.output.focus)
+    """Return a configuration without settings that change no result: output paths and workers."""
+    chosen = config.output
+    output = OutputSettings(record=chosen.record, focus=chosen.focus, without=chosen.without)
     return replace(config, output=output, run=ExecutionSettings(), fleet=FleetSettings())
 
 
@@ -453,7 +459,7 @@ def _process(
     result = run.board.score(frame, role, tuple(variants))
     disturbed, failures = _disturb(run, frame) if is_scored else ({}, [])
     result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
-    lines = csv_lines(run.key, frame_rows(result))
+    lines = run.csv_lines(frame_rows(result))
     encoded = recorder.encode(result, position - 1) if recorder else None
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
     return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)

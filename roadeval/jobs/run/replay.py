@@ -26,7 +26,7 @@ from roadeval.recording.layout import RecordRule
 from roadeval.report.images import ExampleFrame
 from roadeval.results.facts import Facts, Origin
 from roadeval.results.folder import ResultsWriter
-from roadeval.results.rows import csv_lines, sum_rows
+from roadeval.results.rows import sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.why import explain
 from roadeval.runtime.files import AnyPath
@@ -131,7 +131,7 @@ def _replay_log(
     with (
         SidecarWriter(to.mcap) if to.mcap else nullcontext() as sidecar,
         recorder_for(runs, to.recording, config) as recorder,
-        ResultsWriter(to.reports) as results,
+        ResultsWriter(to.reports, packed=config.output.packed) as results,
     ):
         drawn = _record_frames(
             runs, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
@@ -182,7 +182,7 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
 
     sums = run.board.summary(run.selection.classes)
     rows = sum_rows(run.board, sums.windows, run.selection.classes)
-    lines = csv_lines(run.key, rows)
+    lines = run.csv_lines(rows)
     results.append(lines)
     shown = [example.frame for example in examples]
     facts = summary.make_facts(run, sums, shown, {} if run.camera else results.tables)
