@@ -174,8 +174,9 @@ ORIENTATIONS: Final = {
 }
 """How an image is turned, by EXIF's number: whether rows and columns are exchanged, then whether
 the rows, and the columns, run backwards."""
-_MARKS: Final = (b"Exif\0\0", b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
-"""Every file with an orientation contains one of these."""
+_MARK_OF_JPEG: Final = b"Exif\0\0"
+_MARKS: Final = (_MARK_OF_JPEG, b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
+"""Every file with an orientation contains one of these, a JPEG the first."""
 
 
 def upright(pixels: Array, orientation: int) -> Array:
@@ -188,7 +189,7 @@ def upright(pixels: Array, orientation: int) -> Array:
 def orientation_of(data: File) -> int:
     """Return the EXIF orientation of an image file, 1 to 8; 1 if it has none."""
     content, format_ = bytes(data), format_of(data)
-    if format_ and any(mark in content for mark in _MARKS):
+    if format_ and any(m in content for m in (_MARKS if format_.plugin else [_MARK_OF_JPEG])):
         plugin = format_.plugin or "Jpeg"
         with suppress(Exception), _opened(data, format_._replace(plugin=plugin)) as image:
             orientation = image.getexif().get(0x0112)
