@@ -265,9 +265,6 @@ def test_a_display_matrix_turns_each_pixel_to_its_place(quarters: int, flip: int
     (a, c), (b, d) = (turn * 65536).tolist()
     matrix = struct.pack("=9i", a, b, 0, c, d, 0, 0, 0, 1 << 30)
 
-    class Side(bytes):
-        type = SimpleNamespace(name="DISPLAYMATRIX")
-
     pixels = np.arange(6).reshape(2, 3)
     expected = {}
     for (row, column), value in np.ndenumerate(pixels):
@@ -276,7 +273,7 @@ def test_a_display_matrix_turns_each_pixel_to_its_place(quarters: int, flip: int
     rows, columns = (np.array([place[axis] for place in expected.values()]) for axis in (0, 1))
     shown = np.zeros((np.ptp(rows) + 1, np.ptp(columns) + 1), int)
     shown[rows - rows.min(), columns - columns.min()] = [*expected]
-    orientation = turn_of(SimpleNamespace(side_data=[Side(matrix)]))
+    orientation = turn_of(SimpleNamespace(side_data={"DISPLAYMATRIX": matrix}))
     np.testing.assert_array_equal(upright(pixels, orientation), shown)
 
 

@@ -343,7 +343,7 @@ class ChunkReader:
                 if file.tell() + len(block) > most:
                     raise BadRecord(f"a chunk of more than {most} bytes")
                 if isinstance(file, BytesIO) and file.tell() + len(block) > IN_MEMORY:
-                    memory = file.getbuffer()
+                    memory = file.getvalue()
                     file = cast("IO[bytes]", TemporaryFile())  # noqa: SIM115
                     file.write(memory)
                 file.write(block)
@@ -351,7 +351,8 @@ class ChunkReader:
             if whole:
                 raise
         self.patience = patience
-        return file.getbuffer() if isinstance(file, BytesIO) else FileBytes(file)
+        # Not `getbuffer`: Python 3.13 prints an error if a cycle with it is collected.
+        return memoryview(file.getvalue()) if isinstance(file, BytesIO) else FileBytes(file)
 
     def _remember(self, offset: int, records: Bytes) -> None:
         self._cache[offset] = records

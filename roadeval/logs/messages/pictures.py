@@ -448,13 +448,13 @@ def _step(one: Picture, other: Picture) -> int:
 
 def turn_of(frame: Any) -> int:
     """Return the orientation of a frame of PyAV by its display matrix, as EXIF counts it."""
-    for side in frame.side_data:
-        if side.type.name == "DISPLAYMATRIX":
-            a, b, _, c, d = struct.unpack("=5i", bytes(side)[:20])
-            exchanged = abs(b) > abs(a)
-            signs = (b < 0, c < 0) if exchanged else (d < 0, a < 0)
-            return next(n for n, turn in ORIENTATIONS.items() if turn == (exchanged, *signs))
-    return 1
+    matrix = frame.side_data.get("DISPLAYMATRIX")
+    if matrix is None:
+        return 1
+    a, b, _, c, d = struct.unpack("=5i", bytes(matrix)[:20])
+    exchanged = abs(b) > abs(a)
+    signs = (b < 0, c < 0) if exchanged else (d < 0, a < 0)
+    return next(n for n, turn in ORIENTATIONS.items() if turn == (exchanged, *signs))
 
 
 def is_keyframe(packet: Picture) -> bool:
