@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache, partial
 from itertools import chain
@@ -67,12 +67,36 @@ COLUMNS: Final[Mapping[str, Sequence[str]]] = {
 """Columns that are read of each table of a fleet."""
 
 
+@dataclass(frozen=True)
+class Listing:
+    """The results below some places, listed once."""
+
+    places: Sequence[tuple[Path, Sequence[Path]]]
+    """Each place with its results: itself, or those below the folder."""
+    errors: Sequence[RoadevalError] = ()
+    """Why other places have none."""
+
+    @property
+    def paths(self) -> list[Path]:
+        """The paths of all results."""
+        return [path for _, results in self.places for path in results]
+
+
+class TooFewRunsError(RoadevalError):
+    """Fewer than two runs, with those that can be read, and why others cannot."""
+
+    def __init__(self, runs: Sequence[RunFacts], lost: Sequence[str]) -> None:
+        problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
+        super().__init__(problem, remedy=next(iter(lost), ""))
+        self.runs, self.lost = runs, lost
+
+
 ReadFrames = Callable[[int, tuple[str, str]], "pd.DataFrame"]
 """Returns the rows of ``frames`` of final masks, in a run by its number, on a drive."""
 
 
 def history(
-    results: Paths,
+    results: Paths | Listing,
     *,
     by: str | None = None,
     last: int = EARLIER,
@@ -96,10 +120,11 @@ def history(
         Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    places, lost = list_results(results)
+    listing = list_results(results)
+    lost: list[str] = [error.sentence for error in listing.errors]
     origins: dict[Path, Origin] = {}
     drives: dict[Path, Result] = {}  # the facts of hundreds of fleets would fill the memory
-    for path in places:
+    for path in listing.paths:
         try:
             result = Result(path)
             if not result.complete:
@@ -112,8 +137,7 @@ def history(
             drives[path] = result
     runs = _runs_in_order(origins, by, lost)
     if len(runs) < 2:
-        problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
-        raise RoadevalError(problem, remedy=next(iter(lost), ""))
+        raise TooFewRunsError(runs, lost)
     run_of = np.array([n for n, run in enumerate(runs) for _ in run.paths])
     paths = [Path(path) for run in runs for path in run.paths]
     rows = _read_rows(paths, drives, lost, on_progress)
@@ -143,15 +167,18 @@ def history(
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
 
 
-def list_results(results: Paths) -> tuple[list[Path], list[str]]:
-    """Return the paths of results, and of those below folders, and why some are not there."""
-    paths, lost = list[Path](), list[str]()
+def list_results(results: Paths | Listing) -> Listing:
+    """Return the results at some places, or below them; a listing as it is."""
+    if isinstance(results, Listing):
+        return results
+    places, errors = list[tuple[Path, Sequence[Path]]](), list[RoadevalError]()
     for place in list_paths(results):
         try:
-            paths += find_results(local_path(place))
+            path = local_path(place)
+            places.append((path, find_results(path)))
         except RoadevalError as error:
-            lost.append(error.sentence)
-    return paths, lost
+            errors.append(error)
+    return Listing(places, errors)
 
 
 def find_results(path: Path) -> list[Path]:
@@ -169,25 +196,31 @@ def find_results(path: Path) -> list[Path]:
             below.clear()
         recordings += [Path(folder, name) for name in sorted(files) if name.endswith(".rrd")]
     if not (folders or recordings):
-        remedy = "name a recording, a results folder, a fleet, or a folder above them"
+        remedy = "put a first one there, or name a recording, a results folder or a fleet"
         raise RoadevalError("holds no results", where=path, remedy=remedy)
     return folders or recordings
 
 
-def last_good(
-    path: Path, besides: Sequence[Path], on_progress: OnProgress = ignore
-) -> tuple[Path, Sequence[str]]:
-    """Return a result's path, or of a folder of runs the newest that no lasting step made worse.
+def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path, Sequence[str]]:
+    """Return the first place's result, or of its runs the newest that no lasting step made worse.
 
-    Results ``besides`` are no runs of the folder. Returned with it are the runs that could not be
-    read, and why.
+    Results of the other places are no runs of the folder. Returned with it are the runs that could
+    not be read, and why. A `RoadevalError` if none can be read.
     """
-    taken = {other.resolve() for other in besides}
-    paths = [result for result in find_results(path) if result.resolve() not in taken]
+    (place, runs), *others = listing.places
+    taken = {path.resolve() for path in Listing(others).paths}
+    paths = [path for path in runs if path.resolve() not in taken]
     if len(paths) < 2:
-        return (paths or [path])[0], ()
-    runs = history(paths, on_progress=on_progress)
-    return Path(runs.last_good.paths[0]), runs.lost
+        return (paths or [place])[0], ()
+    try:
+        made = history(paths, on_progress=on_progress)
+    except TooFewRunsError as error:
+        if not error.runs:
+            raise RoadevalError(
+                "no run of it can be read", where=place, remedy=error.remedy
+            ) from error
+        return Path(error.runs[0].paths[0]), error.lost
+    return Path(made.last_good.paths[0]), made.lost
 
 
 def _runs_in_order(
@@ -207,6 +240,8 @@ def _runs_in_order(
     distinct = (form for form in forms if len({f"{time:{form}}" for time in times}) == len(times))
     form = next(distinct, forms[-1])
     titles = [*groups] if by else [f"{time:{form}}" for time in times]
+    times_before = [titles[:place].count(title) for place, title in enumerate(titles)]
+    titles = [f"{t} ({n + 1})" if n else t for t, n in zip(titles, times_before, strict=True)]
     paths = [tuple(path for _, path in members) for members in groups.values()]
     return [RunFacts(*run) for run in zip(paths, firsts, titles, strict=True)]
 
