@@ -10,7 +10,10 @@ import pandas as pd
 import pytest
 
 from roadeval import Result, RoadevalError, compare, history
-from roadeval.jobs.results.history import find_results, list_results, write
+from roadeval.cli.commands.compare import compare as compare_command
+from roadeval.cli.commands.history import history as history_command
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.jobs.results.history import find_results, write
 from roadeval.report.blocks import Figure, Heading
 from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict
@@ -234,7 +237,7 @@ def test_a_place_without_results_does_not_end_a_history(nights, tmp_path):
     assert server.url("404/night.zip") in of_url
 
 
-def test_the_one_run_that_can_be_read_is_the_base_and_the_other_is_told(nights, tmp_path):
+def test_the_one_run_that_can_be_read_is_the_base_and_the_other_is_told(nights, tmp_path, capsys):
     folder = copy_sums(nights, tmp_path / "nights")
     for night in ("0", *"23456"):
         shutil.rmtree(folder / night)
@@ -245,6 +248,9 @@ def test_the_one_run_that_can_be_read_is_the_base_and_the_other_is_told(nights, 
     (lost,) = compared.lost
     assert lost.startswith(str(folder / "1" / "fleet.json"))
     assert lost in compared.comparison.warnings
+    words = [str(folder), str(nights / "0")]
+    assert compare_command(words, quiet=True) == ExitCode.LOSS
+    assert capsys.readouterr().err == f"roadeval: lost: {lost}\n"
     (folder / "7" / "fleet.json").write_text("{")
     with pytest.raises(RoadevalError, match=r"no run of it can be read; .*1/fleet.json"):
         compare([folder, nights / "0"])
@@ -259,9 +265,8 @@ def test_a_baseline_without_results_is_told_in_a_line(nights, tmp_path):
 def test_places_are_listed_once(nights, monkeypatch):
     walked = []
     monkeypatch.setattr("os.walk", lambda path, walk=os.walk: walked.append(path) or walk(path))
-    listing = list_results(nights)
-    history(listing)
-    compare(list_results([nights, nights / "7"]))
+    assert history_command([str(nights)], quiet=True) == ExitCode.DONE
+    assert compare_command([str(nights), str(nights / "7")], quiet=True) == ExitCode.DONE
     assert walked == [nights, nights]
 
 

@@ -65,6 +65,8 @@ COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
 }
 """Columns that are read of each table of a fleet."""
+RUN_KEY: Final = ["run", *KEY]
+"""Columns that name a drive of a run."""
 
 
 @dataclass(frozen=True)
@@ -138,18 +140,9 @@ def history(
     runs = _runs_in_order(origins, by, lost)
     if len(runs) < 2:
         raise TooFewRunsError(runs, lost)
-    run_of = np.array([n for n, run in enumerate(runs) for _ in run.paths])
-    paths = [Path(path) for run in runs for path in run.paths]
-    rows = _read_rows(paths, drives, lost, on_progress)
-    rows = rows.assign(run=run_of[rows["run"]])
-    key = ["run", *KEY]
-    if by:
-        logs = rows[[*key, "log_digest"]].drop_duplicates()
-        names = logs[logs.duplicated(key)]["drive"].unique()
-        lost += [f"two logs of a run are called {n}: only the later result counts" for n in names]
-        rows = rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
-    masks = only(rows, kind=ALL).drop_duplicates(key).groupby("run")["frames"].agg(["size", "sum"])
-    sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
+    rows = _read_rows(runs, drives, lost, on_progress)
+    masks = only(rows, kind=ALL).drop_duplicates(RUN_KEY).groupby("run")["frames"]
+    sizes = masks.agg(["size", "sum"]).reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
     newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
     settings, focus = newest.evaluation, newest.focus or ""
@@ -256,12 +249,17 @@ def _origin(result: Result, path: Path) -> Origin:
 
 
 def _read_rows(
-    paths: Sequence[Path],
+    runs: Sequence[RunFacts],
     drives: Mapping[Path, Result],
     lost: list[str],
     on_progress: OnProgress,
 ) -> pd.DataFrame:
-    """Return the rows for `find_lines` of results: of the ``drives``, and of fleets."""
+    """Return the rows for `find_lines` of runs, whose results are ``drives`` and fleets.
+
+    Of a drive that a run has twice the later result counts.
+    """
+    paths = [Path(path) for run in runs for path in run.paths]
+    run_of = np.array([number for number, run in enumerate(runs) for _ in run.paths])
     parts: list[pd.DataFrame] = []
     for begin in range(0, len(paths), BATCH):
         on_progress(Progress(begin, len(paths), "reading", unit="results"))
@@ -277,7 +275,14 @@ def _read_rows(
             parts.append(_join_tables(*map(concatenate, tables.values())))
     if not parts:
         raise RoadevalError(lost[0] if lost else "nothing was scored in any of the runs")
-    return concatenate(parts)
+    rows = concatenate(parts)
+    rows = rows.assign(run=run_of[rows["run"]])
+    if len(paths) == len(runs):
+        return rows
+    logs = rows[[*RUN_KEY, "log_digest"]].drop_duplicates()
+    names = logs[logs.duplicated(RUN_KEY)]["drive"].unique()
+    lost += [f"two logs of a run are called {n}: only the later result counts" for n in names]
+    return rows[~rows.duplicated([*RUN_KEY, "variant", "kind", "part"], keep="last")]
 
 
 def _read_batch(
@@ -306,7 +311,6 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     """Return the rows for `find_lines` from tables of all results, whose number is ``run``."""
     import pandas as pd
 
-    key = ["run", *KEY]
     is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
     classes = classes[is_class & (classes["pixels"] > 0)]
     right = classes["road"] / classes["pixels"]
@@ -319,16 +323,18 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     of_classes["kind"] = kinds[np.full(len(classes), 2)]
     of_masks = scores.assign(part=scores["region"], road=scores["TP"] + scores["FN"])
     of_masks["kind"] = kinds[(scores["region"] != ALL).to_numpy(int)]
-    about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
-    about = about.merge(only(scores, region=ALL)[[*key, "truth"]].drop_duplicates(key), on=key)
+    about = drives[[*RUN_KEY, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
+    about = about.merge(
+        only(scores, region=ALL)[[*RUN_KEY, "truth"]].drop_duplicates(RUN_KEY), on=RUN_KEY
+    )
     for other in ("log_digest", "drive"):
         about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
     about["group"] = about["group"].astype("category")
-    columns = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
+    columns = [*RUN_KEY, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
     # A merge over other categories would make texts of them.
-    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=key)
+    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
     return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
 
