@@ -131,10 +131,7 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
 
 
 def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Container[str]) -> pa.Table:
-    """Return rows with the columns of `LATER`; a ValueError if others, or values, are lacking.
-
-    So does a count that is negative, and a rate that is negative or infinite.
-    """
+    """Return rows with the columns of `LATER`; a ValueError if others lack, or a value is wrong."""
     import pyarrow as pa
     from pyarrow import compute
 
@@ -153,9 +150,8 @@ def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Containe
             raise ValueError(f"column {name} lacks a value")
         least = -math.inf if name in SIGNED else 0
         ends = compute.min_max(cells).as_py() if kind in (Kind.COUNT, Kind.RATE) else {}
-        for value in (value for value in ends.values() if value is not None):
-            if value < least or math.isinf(value):
-                raise ValueError(f"column {name} holds {value}")
+        if wrong := [n for n in ends.values() if n is not None and (n < least or math.isinf(n))]:
+            raise ValueError(f"column {name} holds {wrong[0]}")
     return rows
 
 
