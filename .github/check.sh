@@ -4,9 +4,9 @@
 #
 #   DRIVES    a drive, or a folder or list of drives
 #   ARGS      more options of replay or fleet, apart by spaces
-#   FAIL_IF   conditions of compare, one a line
+#   FAIL_IF   conditions of compare, one a line; a wrong one ends the check before the replay
 #   BASELINE  the last good result, its URL, or a folder of runs; .roadeval/base by default. None
-#             yet: passes
+#             yet, or an empty folder: passes
 #   KEEP      1: a result that passed becomes the baseline, or one more run of the folder; one at a
 #             URL stays
 #   NAME      name of the check; each has its comment
@@ -22,32 +22,41 @@ rm -rf "$new" .roadeval/comment.md .roadeval/compare.html .roadeval/badge.svg .r
 [ -z "${GITHUB_ACTIONS:-}" ] ||
   echo "::stop-commands::$(od -An -N16 -tx1 /dev/urandom | tr -d ' \n')"
 
+compare() {
+  while IFS= read -r limit; do
+    [ -z "$limit" ] || set -- "$@" --fail-if "$limit"
+  done <<EOF
+${FAIL_IF:-}
+EOF
+  roadeval compare "$@" 2> .roadeval/errors.txt
+}
+
 set -f # the options are split at spaces, and no more
 if [ "${DRIVES%.mcap}" != "$DRIVES" ] || [ -f "$DRIVES/metadata.yaml" ]; then
   set -- replay --record none --reports "$new" ${ARGS:-} -- "$DRIVES"
 else
   set -- fleet --record none --output "$new" ${ARGS:-} -- "$DRIVES"
 fi
-roadeval "$@" 2> .roadeval/errors.txt || code=$?
+
+# Conditions are read before results. There is none yet: only exit code 2 says that one is wrong.
+what="a condition is wrong"
+[ -z "${FAIL_IF:-}" ] || compare "$new" || [ $? != 2 ] || code=2
+if [ "$code" = 0 ]; then
+  roadeval "$@" 2> .roadeval/errors.txt || code=$?
+  what="the replay ended with exit code $code"
+fi
 cat .roadeval/errors.txt >&2
 
-if [ "$code" != 0 ] && [ "$code" != 3 ]; then # 3: a part of a log was lost, and compare says which
-  what="the replay ended with exit code $code"
-elif [ -e "$base" ] || [ "${base#*://}" != "$base" ]; then
+if [ "$code" = 0 ] || [ "$code" = 3 ]; then # 3: a part of a log was lost, and compare says which
   code=0
-  set -- "$base" "$new" --markdown .roadeval/comment.md --junit .roadeval/junit.xml
-  while IFS= read -r limit; do
-    [ -z "$limit" ] || set -- "$@" --fail-if "$limit"
-  done <<EOF
-${FAIL_IF:-}
-EOF
-  roadeval compare "$@" -o .roadeval/compare.html -o .roadeval/badge.svg 2> .roadeval/errors.txt ||
-    code=$?
-  cat .roadeval/errors.txt >&2
-  what="the comparison ended with exit code $code"
-else
-  code=0
-  echo "## roadeval: passed, there is no baseline yet" > .roadeval/comment.md
+  if [ -n "$(ls -- "$base" 2> /dev/null)" ] || [ "${base#*://}" != "$base" ]; then
+    set -- "$base" "$new" --markdown .roadeval/comment.md --junit .roadeval/junit.xml
+    compare "$@" -o .roadeval/compare.html -o .roadeval/badge.svg || code=$?
+    cat .roadeval/errors.txt >&2
+    what="the comparison ended with exit code $code"
+  else
+    echo "## roadeval: passed, there is no baseline yet" > .roadeval/comment.md
+  fi
 fi
 # Names in errors are from logs: in a block of code they do nothing.
 [ -e .roadeval/comment.md ] || {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
+import math
 import zlib
 from collections.abc import Collection, Container, Mapping, Sequence
 from contextlib import ExitStack
@@ -41,6 +42,8 @@ FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 3}
 """Format of a fleet's folder and its tables. A column that changes its meaning raises the version;
 for one that is added the fleet's command, run again, makes the tables anew."""
 AGAIN: Final = "run the fleet's command again"
+SIGNED: Final = ("exit_code", "truth", "mean", "low", "high")
+"""Columns of counts and rates that may be negative: checksums, differences, signals."""
 _ANEW: Final = "make the results again with roadeval replay"
 
 
@@ -146,8 +149,9 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
 
 
 def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Container[str]) -> pa.Table:
-    """Return rows with the columns of `LATER`; a ValueError if others, or values, are lacking."""
+    """Return rows with the columns of `LATER`; a ValueError if others lack, or a value is wrong."""
     import pyarrow as pa
+    from pyarrow import compute
 
     for name in sorted({*LATER} & {column.name for column in columns} - {*rows.column_names}):
         rows = rows.append_column(name, pa.array(np.zeros(len(rows), np.int64)))
@@ -162,6 +166,10 @@ def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Containe
             raise ValueError(f"column {name} is not of type {expected}")
         if cells.null_count and name in complete:
             raise ValueError(f"column {name} lacks a value")
+        least = -math.inf if name in SIGNED else 0
+        ends = compute.min_max(cells).as_py() if kind in (Kind.COUNT, Kind.RATE) else {}
+        if wrong := [n for n in ends.values() if n is not None and (n < least or math.isinf(n))]:
+            raise ValueError(f"column {name} holds {wrong[0]}")
     return rows
 
 
@@ -278,6 +286,8 @@ def _read_files(
             tags = [n for n in file.schema_arrow.names if of_drives and n.startswith(TAG)]
             part = file.read([*names, *tags] if chosen else None, use_threads=False)
         part = _check_columns(part, columns, complete)
+        if of_drives and not len(part):
+            raise ValueError("it has no rows")
         if runs:
             part = part.append_column("run", pa.array(np.full(len(part), runs[place])))
         parts.append(part.filter(part[flag]) if flag else part)

@@ -92,6 +92,7 @@ def check(site, results, tmp_path):
     bin_ = tmp_path / "bin"
     bin_.mkdir()
     (bin_ / "roadeval").write_text(f"""#!/bin/sh
+[ "$1" != compare ] || [ -e "$2" ] || [ "${{2#*://}}" != "$2" ] || exec "{ROADEVAL}" "$@"
 echo "$*" >> "{tmp_path}/commands"
 [ -d "{results}/$RESULT" ] || {{ echo "error: $RESULT @octocat" >&2; exit 1; }}
 [ "$1" = compare ] || exec cp -R "{results}/$RESULT" .roadeval/new
@@ -194,6 +195,39 @@ def test_a_push_that_fails_is_no_baseline(check):
     before = (check.repository / ".roadeval" / "base" / "frames.csv").read_bytes()
     assert check("bad", {}).returncode == 4
     assert (check.repository / ".roadeval" / "base" / "frames.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("baseline", ["", "runs"])
+def test_a_wrong_condition_is_told_before_the_replay_whether_there_is_a_baseline(
+    baseline, check, site
+):
+    (check.repository / "runs").mkdir()
+    limits = f"{LIMIT}\npost.filtered.ERR >> much"
+    done = check("good", PULL, FAIL_IF=limits, BASELINE=baseline)
+    assert done.returncode == 2
+    assert not check.commands.exists()
+    assert "much" in done.stderr
+    assert site.ours[0].startswith("## roadeval: failed, a condition is wrong\n\n    ")
+
+
+def test_an_empty_folder_is_no_baseline_yet_and_has_its_first_run_then(check):
+    runs = check.repository / "runs"
+    runs.mkdir()
+    (runs / ".gitkeep").touch()
+    done = check("good", {}, BASELINE="runs")
+    assert done.returncode == 0, done.stderr
+    assert done.summary == "## roadeval: passed, there is no baseline yet\n"
+    assert len([*runs.glob("*/summary.json")]) == 1
+
+
+def test_a_baseline_at_a_url_is_compared_with_and_not_replaced(check):
+    check("good", {})
+    assert check("good", {}).returncode == 0
+    before = sorted(check.repository.iterdir())
+    url = "https://example.org/base.zip"
+    assert check("good", {}, BASELINE=url).returncode == 0
+    assert check.commands.read_text().splitlines()[-1].startswith(f"compare {url} .roadeval/new ")
+    assert sorted(check.repository.iterdir()) == before
 
 
 @pytest.mark.sweep

@@ -1,6 +1,7 @@
 """Histories of many results: read in their order, judged, and written."""
 
 import json
+import os
 import shutil
 from dataclasses import replace
 
@@ -9,11 +10,14 @@ import pandas as pd
 import pytest
 
 from roadeval import Result, RoadevalError, compare, history
+from roadeval.cli.commands.compare import compare as compare_command
+from roadeval.cli.commands.history import history as history_command
+from roadeval.cli.exit_codes import ExitCode
 from roadeval.jobs.results.history import find_results, write
 from roadeval.report.blocks import Figure, Heading
 from roadeval.report.history import document, markdown
 from roadeval.results.history import group_changes, verdict
-from roadeval.results.tables import read_parquet, read_table, write_parquet
+from roadeval.results.tables import ResultsError, read_parquet, read_table, write_parquet
 from tests.fleet.serving import Server
 from tests.results.fleet.making import SCORED, UNSCORED, fleet_of
 
@@ -231,6 +235,78 @@ def test_a_place_without_results_does_not_end_a_history(nights, tmp_path):
     of_folder, of_url = made.lost
     assert of_folder.startswith(str(tmp_path))
     assert server.url("404/night.zip") in of_url
+
+
+def test_the_one_run_that_can_be_read_is_the_base_and_the_other_is_told(nights, tmp_path, capsys):
+    folder = copy_sums(nights, tmp_path / "nights")
+    for night in ("0", *"23456"):
+        shutil.rmtree(folder / night)
+    (folder / "1" / "fleet.json").write_text("{")
+    shutil.copytree(nights / "7", folder / "7", dirs_exist_ok=True)
+    compared = compare([folder, nights / "0"])
+    assert [result.label for result in compared.comparison.results] == ["7", "0"]
+    (lost,) = compared.lost
+    assert lost.startswith(str(folder / "1" / "fleet.json"))
+    assert lost in compared.comparison.warnings
+    words = [str(folder), str(nights / "0")]
+    assert compare_command(words, quiet=True) == ExitCode.LOSS
+    assert capsys.readouterr().err == f"roadeval: lost: {lost}\n"
+    (folder / "7" / "fleet.json").write_text("{")
+    with pytest.raises(RoadevalError, match=r"no run of it can be read; .*1/fleet.json"):
+        compare([folder, nights / "0"])
+
+
+def test_a_baseline_without_results_is_told_in_a_line(nights, tmp_path):
+    with pytest.raises(RoadevalError) as failure:
+        compare([tmp_path, nights / "7"])
+    assert (failure.value.where, failure.value.problem) == (str(tmp_path), "holds no results")
+
+
+def test_places_are_listed_once(nights, monkeypatch):
+    walked = []
+    monkeypatch.setattr("os.walk", lambda path, walk=os.walk: walked.append(path) or walk(path))
+    assert history_command([str(nights)], quiet=True) == ExitCode.DONE
+    assert compare_command([str(nights), str(nights / "7")], quiet=True) == ExitCode.DONE
+    assert walked == [nights, nights]
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "value"),
+    [("scores", "ERR", np.inf), ("scores", "pooled_FPR", -0.1), ("scores", "TP", -1)],
+)
+def test_a_number_that_is_none_is_told_as_damage(name, column, value, nights, tmp_path):
+    folder = copy_sums(nights, tmp_path / "nights")
+    path = folder / "3" / f"{name}.parquet"
+    rows = read_parquet([path], name)
+    rows.loc[0, column] = value
+    write_parquet({path: (name, rows)})
+    with pytest.raises(ResultsError, match=f"damaged .column {column} holds {value}"):
+        read_parquet([path], name)
+    if column != "pooled_FPR":  # which a history does not read
+        made = history(folder)
+        assert [f"{path}: damaged" in text for text in made.lost] == [True]
+        assert [run.drives for run in made.runs] == [6, 6, 6, 0, 6, 6, 6, 6]
+
+
+def test_a_table_of_drives_without_rows_is_told_as_damage(nights, tmp_path):
+    folder = copy_sums(nights, tmp_path / "nights")
+    path = folder / "3" / "drives.parquet"
+    write_parquet({path: ("drives", read_parquet([path], "drives").iloc[:0])})
+    assert history(folder).lost == [
+        f"{path}: damaged (it has no rows); run the fleet's command again"
+    ]
+
+
+def test_runs_of_one_second_have_titles_of_their_own(nights, tmp_path):
+    folder = copy_sums(nights, tmp_path / "nights")
+    for night in range(8):
+        path = folder / f"{night}" / "fleet.json"
+        content = json.loads(path.read_text())
+        content["origin"]["made_ns"] = 1000 * DAY * 10**9 + night // 3
+        path.write_text(json.dumps(content))
+    titles = [run.title for run in history(folder).runs]
+    first = "1972-09-27 00:00:00"
+    assert titles == [first, *(f"{first} ({number})" for number in range(2, 9))]
 
 
 def test_a_folder_of_runs_is_not_compared_with_itself(nights):

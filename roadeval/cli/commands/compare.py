@@ -63,7 +63,8 @@ def compare(
     left out. One drive is judged over its frames, several drives are judged over the drives.
     Results of different drives are not compared. Exit code 4 if a --fail-if condition holds; 1 if
     one cannot be judged, as when two results share fewer than ten frames, or fewer than half the
-    frames of the smaller one; 3 if drives of a fleet failed, which are in no number.
+    frames of the smaller one; 3 if drives of a fleet failed, which are in no number, or if a run of
+    the base folder cannot be read.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
@@ -75,11 +76,11 @@ def compare(
     typed = shlex.join(["roadeval", "compare", *map(str, results), *options])
     files = [(path, "") for path in output or ()]
     files += [(path, kind) for path, kind in ((junit, "junit"), (markdown, "comment")) if path]
-    places, _ = list_results(results)
-    with holding(*(path for path, _ in files), inputs=places):
+    listing = list_results(results)
+    with holding(*(path for path, _ in files), inputs=listing.paths):
         with progress.show(quiet or json) as watch:
             compared = comparing.compare(
-                results, variants=variant, fail_if=fail_if or [], on_progress=watch
+                listing, variants=variant, fail_if=fail_if or [], on_progress=watch
             )
         for path, kind in files:
             comparing.write(compared, path, kind, typed)

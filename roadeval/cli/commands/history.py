@@ -53,10 +53,10 @@ def history(
     from roadeval.jobs.outputs import holding
     from roadeval.jobs.results import history as job
 
-    places, _ = job.list_results(results)
-    with holding(*(output or ()), inputs=places):
+    listing = job.list_results(results)
+    with holding(*(output or ()), inputs=listing.paths):
         with progress.show(quiet or json) as watch:
-            made = job.history(results, by=by, last=last, fail_if=fail_if or [], on_progress=watch)
+            made = job.history(listing, by=by, last=last, fail_if=fail_if or [], on_progress=watch)
         for path in output or []:
             job.write(made, path)
     if json:

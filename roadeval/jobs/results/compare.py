@@ -19,8 +19,8 @@ from roadeval.evaluation.comparison.pairing import Side, one_drive
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import concatenate, finals, only, values_of, windows
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.results.history import find_results, last_good
-from roadeval.jobs.results.result import DriveResult, Result, local_path
+from roadeval.jobs.results.history import Listing, last_good, list_results
+from roadeval.jobs.results.result import DriveResult, Result
 from roadeval.report.chart import Chart, looks, looks_of_results
 from roadeval.report.charts.standard import over_windows
 from roadeval.report.comment import badge
@@ -29,7 +29,7 @@ from roadeval.report.writing import write_document, write_file
 from roadeval.results.comparison import as_dict, junit_xml
 from roadeval.results.facts import json_text, plain
 from roadeval.results.schema import FAILED
-from roadeval.runtime.files import Paths, list_paths
+from roadeval.runtime.files import Paths
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Compared:
     recordings: Mapping[str, DriveResult]
     """By the results' labels; a folder has none."""
     lost: tuple[str, ...] = ()
-    """Which drives of a fleet failed, so that no number counts them; among the warnings, too."""
+    """Drives of a fleet that failed, and runs that cannot be read; among the warnings, too."""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -60,7 +60,7 @@ class Compared:
 
 
 def compare(
-    results: Paths,
+    results: Paths | Listing,
     *,
     variants: Sequence[str] | None = None,
     fail_if: Sequence[str] = (),
@@ -85,7 +85,7 @@ def compare(
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    paths, unread = _choose_paths(results, on_progress)
+    paths, unread = _choose_paths(list_results(results), on_progress)
     across = len(paths) == 1
     opened = [Result(path) for path in paths]
     if across:
@@ -111,8 +111,8 @@ def compare(
         result.name if across else side.label for side, result in labelled if not result.complete
     )
     ends = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
-    lost = dict.fromkeys(filter(None, map(_failure_sentence, opened)))
-    comparison = replace(comparison, warnings=(*lost, *unread, *ends, *comparison.warnings))
+    lost = dict.fromkeys([*filter(None, map(_failure_sentence, opened)), *unread])
+    comparison = replace(comparison, warnings=(*lost, *ends, *comparison.warnings))
     alone = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: result.drive
@@ -123,24 +123,26 @@ def compare(
     return Compared(comparison, judgements, tuple(alone or ()), recordings, tuple(lost))
 
 
-def _choose_paths(results: Paths, on_progress: OnProgress) -> tuple[list[Path], Sequence[str]]:
+def _choose_paths(listing: Listing, on_progress: OnProgress) -> tuple[list[Path], Sequence[str]]:
     """Return the paths of the results, the base first, and why runs beside it cannot be read.
 
     A `RoadevalError` if there is none, or only a folder of several results.
     """
-    paths = [local_path(path) for path in list_paths(results)]
-    if not paths:
+    if listing.errors:
+        raise listing.errors[0]
+    if not listing.places:
         raise RoadevalError("nothing to compare: name one result, or several")
-    if len(paths) > 1:
-        base, unread = last_good(paths[0], paths[1:], on_progress)
-        return [base, *paths[1:]], unread
-    if len(there := find_results(paths[0])) > 1:
+    (first, there), *others = listing.places
+    if others:
+        base, unread = last_good(listing, on_progress)
+        return [base, *(path for path, _ in others)], unread
+    if len(there) > 1:
         raise RoadevalError(
             f"holds {len(there)} results",
-            where=paths[0],
+            where=first,
             remedy="name behind it the result to hold against them, or use 'roadeval history'",
         )
-    return there, ()
+    return [*there], ()
 
 
 def _failure_sentence(result: Result) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache, partial
 from itertools import chain
@@ -65,6 +65,32 @@ COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "classes": (*KEY, "variant", "class", "name", "truth", "pixels", "road", "frames"),
 }
 """Columns that are read of each table of a fleet."""
+RUN_KEY: Final = ["run", *KEY]
+"""Columns that name a drive of a run."""
+
+
+@dataclass(frozen=True)
+class Listing:
+    """The results below some places, listed once."""
+
+    places: Sequence[tuple[Path, Sequence[Path]]]
+    """Each place with its results: itself, or those below the folder."""
+    errors: Sequence[RoadevalError] = ()
+    """Why other places have none."""
+
+    @property
+    def paths(self) -> list[Path]:
+        """The paths of all results."""
+        return [path for _, results in self.places for path in results]
+
+
+class TooFewRunsError(RoadevalError):
+    """Fewer than two runs, with those that can be read, and why others cannot."""
+
+    def __init__(self, runs: Sequence[RunFacts], lost: Sequence[str]) -> None:
+        problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
+        super().__init__(problem, remedy=next(iter(lost), ""))
+        self.runs, self.lost = runs, lost
 
 
 ReadFrames = Callable[[int, tuple[str, str]], "pd.DataFrame"]
@@ -72,7 +98,7 @@ ReadFrames = Callable[[int, tuple[str, str]], "pd.DataFrame"]
 
 
 def history(
-    results: Paths,
+    results: Paths | Listing,
     *,
     by: str | None = None,
     last: int = EARLIER,
@@ -96,10 +122,11 @@ def history(
         Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    places, lost = list_results(results)
+    listing = list_results(results)
+    lost: list[str] = [error.sentence for error in listing.errors]
     origins: dict[Path, Origin] = {}
     drives: dict[Path, Result] = {}  # the facts of hundreds of fleets would fill the memory
-    for path in places:
+    for path in listing.paths:
         try:
             result = Result(path)
             if not result.complete:
@@ -112,20 +139,10 @@ def history(
             drives[path] = result
     runs = _runs_in_order(origins, by, lost)
     if len(runs) < 2:
-        problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
-        raise RoadevalError(problem, remedy=next(iter(lost), ""))
-    run_of = np.array([n for n, run in enumerate(runs) for _ in run.paths])
-    paths = [Path(path) for run in runs for path in run.paths]
-    rows = _read_rows(paths, drives, lost, on_progress)
-    rows = rows.assign(run=run_of[rows["run"]])
-    key = ["run", *KEY]
-    if by:
-        logs = rows[[*key, "log_digest"]].drop_duplicates()
-        names = logs[logs.duplicated(key)]["drive"].unique()
-        lost += [f"two logs of a run are called {n}: only the later result counts" for n in names]
-        rows = rows[~rows.duplicated([*key, "variant", "kind", "part"], keep="last")]
-    masks = only(rows, kind=ALL).drop_duplicates(key).groupby("run")["frames"].agg(["size", "sum"])
-    sizes = masks.reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
+        raise TooFewRunsError(runs, lost)
+    rows = _read_rows(runs, drives, lost, on_progress)
+    masks = only(rows, kind=ALL).drop_duplicates(RUN_KEY).groupby("run")["frames"]
+    sizes = masks.agg(["size", "sum"]).reindex(range(len(runs)), fill_value=0).to_numpy().tolist()
     runs = [replace(run, drives=n, frames=m) for run, (n, m) in zip(runs, sizes, strict=True)]
     newest = Result(([run for run in runs if run.drives] or runs)[-1].paths[0]).facts
     settings, focus = newest.evaluation, newest.focus or ""
@@ -143,15 +160,18 @@ def history(
     return History(runs, lines, events, focus, [*judged], [*dict.fromkeys(lost)])
 
 
-def list_results(results: Paths) -> tuple[list[Path], list[str]]:
-    """Return the paths of results, and of those below folders, and why some are not there."""
-    paths, lost = list[Path](), list[str]()
+def list_results(results: Paths | Listing) -> Listing:
+    """Return the results at some places, or below them; a listing as it is."""
+    if isinstance(results, Listing):
+        return results
+    places, errors = list[tuple[Path, Sequence[Path]]](), list[RoadevalError]()
     for place in list_paths(results):
         try:
-            paths += find_results(local_path(place))
+            path = local_path(place)
+            places.append((path, find_results(path)))
         except RoadevalError as error:
-            lost.append(error.sentence)
-    return paths, lost
+            errors.append(error)
+    return Listing(places, errors)
 
 
 def find_results(path: Path) -> list[Path]:
@@ -169,25 +189,31 @@ def find_results(path: Path) -> list[Path]:
             below.clear()
         recordings += [Path(folder, name) for name in sorted(files) if name.endswith(".rrd")]
     if not (folders or recordings):
-        remedy = "name a recording, a results folder, a fleet, or a folder above them"
+        remedy = "put a first one there, or name a recording, a results folder or a fleet"
         raise RoadevalError("holds no results", where=path, remedy=remedy)
     return folders or recordings
 
 
-def last_good(
-    path: Path, besides: Sequence[Path], on_progress: OnProgress = ignore
-) -> tuple[Path, Sequence[str]]:
-    """Return a result's path, or of a folder of runs the newest that no lasting step made worse.
+def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path, Sequence[str]]:
+    """Return the first place's result, or of its runs the newest that no lasting step made worse.
 
-    Results ``besides`` are no runs of the folder. Returned with it are the runs that could not be
-    read, and why.
+    Results of the other places are no runs of the folder. Returned with it are the runs that could
+    not be read, and why. A `RoadevalError` if none can be read.
     """
-    taken = {other.resolve() for other in besides}
-    paths = [result for result in find_results(path) if result.resolve() not in taken]
+    (place, runs), *others = listing.places
+    taken = {path.resolve() for path in Listing(others).paths}
+    paths = [path for path in runs if path.resolve() not in taken]
     if len(paths) < 2:
-        return (paths or [path])[0], ()
-    runs = history(paths, on_progress=on_progress)
-    return Path(runs.last_good.paths[0]), runs.lost
+        return (paths or [place])[0], ()
+    try:
+        made = history(paths, on_progress=on_progress)
+    except TooFewRunsError as error:
+        if not error.runs:
+            raise RoadevalError(
+                "no run of it can be read", where=place, remedy=error.remedy
+            ) from error
+        return Path(error.runs[0].paths[0]), error.lost
+    return Path(made.last_good.paths[0]), made.lost
 
 
 def _runs_in_order(
@@ -207,6 +233,8 @@ def _runs_in_order(
     distinct = (form for form in forms if len({f"{time:{form}}" for time in times}) == len(times))
     form = next(distinct, forms[-1])
     titles = [*groups] if by else [f"{time:{form}}" for time in times]
+    times_before = [titles[:place].count(title) for place, title in enumerate(titles)]
+    titles = [f"{t} ({n + 1})" if n else t for t, n in zip(titles, times_before, strict=True)]
     paths = [tuple(path for _, path in members) for members in groups.values()]
     return [RunFacts(*run) for run in zip(paths, firsts, titles, strict=True)]
 
@@ -221,12 +249,17 @@ def _origin(result: Result, path: Path) -> Origin:
 
 
 def _read_rows(
-    paths: Sequence[Path],
+    runs: Sequence[RunFacts],
     drives: Mapping[Path, Result],
     lost: list[str],
     on_progress: OnProgress,
 ) -> pd.DataFrame:
-    """Return the rows for `find_lines` of results: of the ``drives``, and of fleets."""
+    """Return the rows for `find_lines` of runs, whose results are ``drives`` and fleets.
+
+    Of a drive that a run has twice the later result counts.
+    """
+    paths = [Path(path) for run in runs for path in run.paths]
+    run_of = np.array([number for number, run in enumerate(runs) for _ in run.paths])
     parts: list[pd.DataFrame] = []
     for begin in range(0, len(paths), BATCH):
         on_progress(Progress(begin, len(paths), "reading", unit="results"))
@@ -242,7 +275,14 @@ def _read_rows(
             parts.append(_join_tables(*map(concatenate, tables.values())))
     if not parts:
         raise RoadevalError(lost[0] if lost else "nothing was scored in any of the runs")
-    return concatenate(parts)
+    rows = concatenate(parts)
+    rows = rows.assign(run=run_of[rows["run"]])
+    if len(paths) == len(runs):
+        return rows
+    logs = rows[[*RUN_KEY, "log_digest"]].drop_duplicates()
+    names = logs[logs.duplicated(RUN_KEY)]["drive"].unique()
+    lost += [f"two logs of a run are called {n}: only the later result counts" for n in names]
+    return rows[~rows.duplicated([*RUN_KEY, "variant", "kind", "part"], keep="last")]
 
 
 def _read_batch(
@@ -271,7 +311,6 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     """Return the rows for `find_lines` from tables of all results, whose number is ``run``."""
     import pandas as pd
 
-    key = ["run", *KEY]
     is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
     classes = classes[is_class & (classes["pixels"] > 0)]
     right = classes["road"] / classes["pixels"]
@@ -284,16 +323,18 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     of_classes["kind"] = kinds[np.full(len(classes), 2)]
     of_masks = scores.assign(part=scores["region"], road=scores["TP"] + scores["FN"])
     of_masks["kind"] = kinds[(scores["region"] != ALL).to_numpy(int)]
-    about = drives[[*key, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
-    about = about.merge(only(scores, region=ALL)[[*key, "truth"]].drop_duplicates(key), on=key)
+    about = drives[[*RUN_KEY, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
+    about = about.merge(
+        only(scores, region=ALL)[[*RUN_KEY, "truth"]].drop_duplicates(RUN_KEY), on=RUN_KEY
+    )
     for other in ("log_digest", "drive"):
         about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
     about["group"] = about["group"].astype("category")
-    columns = [*key, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
+    columns = [*RUN_KEY, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
     # A merge over other categories would make texts of them.
-    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=key)
+    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
     return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
 
