@@ -169,7 +169,7 @@ def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
     with suppress(OSError):
         state = path.stat()
         return _load(path, stages, state.st_ino, state.st_size, state.st_mtime_ns)
-    return load_model(path)  # it raises the error
+    return load_model(path)  # this raises the error as a `ModelError`
 
 
 @lru_cache(maxsize=2)

@@ -1,4 +1,4 @@
-"""Every choice of the training, with its reason."""
+"""Settings of the training."""
 
 from __future__ import annotations
 
