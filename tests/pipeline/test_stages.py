@@ -1,5 +1,7 @@
 """Stages from outside the package: imported by their names, and guarded in what they hand out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,7 +56,10 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("wrong_size", r"its mask is \(2, 2\)"), ("LAYERS", "a layer 'level' that it does not")],
+    [
+        ("wrong_size", r"its mask is \(2, 2\)"),
+        ("LAYERS", "a layer 'level' that its stage does not"),
+    ],
 )
 def test_an_output_that_cannot_be_is_an_error(name, message):
     with pytest.raises(StageError, match=message):
@@ -129,6 +134,16 @@ def run(spec, array):
 
     stage = Stage("own", "Own", int, bind, (spec,))
     return guard(stage).bind(0, None)(View.of(BLACK))
+
+
+@pytest.mark.parametrize("hook", ["bind", "fit", "adapt", "oracle"])
+def test_an_error_of_any_function_of_a_stage_names_the_stage(hook):
+    def fail(*_):
+        raise KeyError("no road")
+
+    stage = replace(Stage("own", "Own", int, lambda *_: None, (SPEC,)), **{hook: fail})
+    with pytest.raises(StageError, match=r"stage own .*: KeyError: 'no road' \(test_stages.py:"):
+        getattr(guard(stage), hook)(None, None)
 
 
 @pytest.mark.parametrize("held", [bool, np.int64])

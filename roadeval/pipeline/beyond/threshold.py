@@ -1,4 +1,4 @@
-"""The threshold on how probable road is, chosen where training frames have the fewest errors."""
+"""A threshold on the probability of road: the one with the fewest errors on the training frames."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Threshold:
 def codes_of(opinion: Output | None) -> Probability:
     """Return the codes of probability of the stage before; a `StageError` if it has none."""
     if opinion is None or opinion.probability is None:
-        raise StageError("threshold: the stage before does not say how probable road is")
+        raise StageError("threshold: the stage before it gives no probability of road")
     return opinion.probability
 
 

@@ -1,7 +1,7 @@
 """Phase 2, the shadow filter (section 3.2): finds shadow and gives it the colours around it.
 
-It has hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8),
-components and buffer rings (Eq. 9-10), their compensation (Eq. 11), and the stage.
+The steps are hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8),
+components and buffer rings (Eq. 9-10), and their compensation (Eq. 11).
 """
 
 from __future__ import annotations
