@@ -191,11 +191,10 @@ class LabelSettings:
     def with_values(
         self, where: str, names: Mapping[str, str] | None = None, classes: Collection[str] = ()
     ) -> LabelSettings:
-        """Return the settings with the values, or colours, of classes that they call by name.
+        """Return the settings with values, or colours, in place of the names of classes.
 
-        ``names`` are further names by value, which the log tells: none of colours. ``classes`` are
-        names that stand in the labels themselves. A `LogError` if there are names, but a class is
-        none of them.
+        ``names`` are further names by value, from the log. ``classes`` are names that stand in the
+        labels themselves. A `LogError` if there are names, but a class is none of them.
         """
         names = self.names if self.by_color else {**(names or {}), **self.names}
         chosen = dict[str, Any]()
@@ -314,7 +313,7 @@ class FrameSettings:
 
 
 AUDIT: Final = "audit.json"
-"""The file in a folder of labels to correct: the drive's own labels are read, too."""
+"""The file that marks a folder of corrected labels: the drive's other labels are read, too."""
 
 
 @dataclass(frozen=True)

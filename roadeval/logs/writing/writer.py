@@ -1,4 +1,4 @@
-"""The writers of camera logs from images, a video, or results; Foxglove and Rerun open them too.
+"""Writers of camera logs from images, a video, or results; Foxglove and Rerun can open the logs.
 
 Viewers merge open files by time, so the messages of a sidecar of results have the stamps and log
 times of the images. The camera's log is not changed.
