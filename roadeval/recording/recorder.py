@@ -517,7 +517,8 @@ class Recorder:
                 break
         if not answer.done() or answer.exception():
             atexit.unregister(rr.rerun_shutdown)
-            in_thread(partial(_keep, self._stream))
+            # Freeing the stream would wait for its writer, so a thread keeps it to the end.
+            in_thread(partial(lambda _stream: Event().wait(), self._stream))
             self._failed, self._stream = True, None
             raise self._incomplete()
 
@@ -561,11 +562,6 @@ class Recorder:
         error = RecordingError(problem, where=self.path)
         error.__cause__ = refusal
         return error
-
-
-def _keep(_stream: object) -> None:
-    """Keep a stream until the process ends: freeing it would wait for its writer."""
-    Event().wait()
 
 
 def _failure(number: int) -> OSError:

@@ -100,10 +100,9 @@ COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image"
 class GatedSettings:
     """Settings of the gated filter.
 
-    odds: Factor of the odds that a candidate is shaded road. A greater one brings back more dark
-        road, and brightens more pixels that are not road. A classifier on colours takes all of
-        those for road, and needs a small factor; one that sees place and surroundings as well works
-        with 1.
+    odds: Factor of the odds that a candidate is shaded road. A greater one brightens more dark
+        road, but also more pixels that are not road. A classifier on colours calls these road, and
+        needs a small factor; one that also sees place and surroundings works with 1.
     """
 
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
