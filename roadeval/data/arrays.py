@@ -86,10 +86,6 @@ class Packed:
         """Return ``(H, W)`` uint8, 0 or 1."""
         return unpack(self.bits, self.width)
 
-    def area(self) -> int:
-        """Count the pixels inside."""
-        return ones(self.bits)
-
 
 def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
     """Pack an ``(H, W)`` mask, nonzero inside, into ``(H, ceil(W / 64))`` uint64."""

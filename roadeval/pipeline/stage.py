@@ -46,6 +46,11 @@ def stage_settings(cls: type[T]) -> type[T]:
     return cast("type[T]", validated(cls, frozen=True, config=ConfigDict(extra="forbid")))
 
 
+@stage_settings
+class NoSettings:
+    """The stage has no settings."""
+
+
 class MisfitError(RoadevalError, ValueError):
     """Parameters that do not fit a stage's settings: which, and what to do."""
 

@@ -10,7 +10,7 @@ import inspect
 import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import is_dataclass, replace
 from functools import cache
 from importlib import import_module
 from operator import attrgetter
@@ -22,7 +22,7 @@ import numpy as np
 from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
-from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
+from roadeval.pipeline.stage import NoSettings, Output, Stage, StageError, View, per_view
 from roadeval.runtime.discovery import by_name, collect, one_line, points_of
 from roadeval.runtime.files import sha256_of
 
@@ -103,11 +103,6 @@ def check_stage(stage: Stage) -> None:
         raise ValueError(f"its name {stage.name!r} is that of a stage of roadeval")
     if stage.fit is not None and stage.parameters is None:
         raise ValueError("it learns, but does not name the type of its parameters")
-
-
-@dataclass(frozen=True)
-class NoSettings:
-    """Settings of a function that has none."""
 
 
 def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:

@@ -7,7 +7,17 @@ import pytest
 
 from roadeval.config.run import configure
 from roadeval.config.tables import ConfigError
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Moment, Output, Packed, mask_spec
+from roadeval.data import (
+    LabelClass,
+    Layer,
+    LayerKind,
+    LayerSpec,
+    Moment,
+    Output,
+    Packed,
+    mask_spec,
+    ones,
+)
 from roadeval.pipeline.stage import Stage, StageError, View
 from roadeval.pipeline.stages import UnknownStageError, guard, stages_of
 from tests.pipeline.images import noise
@@ -32,8 +42,8 @@ def test_a_function_is_a_stage(name):
 
 
 def test_a_functions_settings_are_those_of_its_default():
-    assert output_of("below").mask.area() == 6 * 6
-    assert output_of("below", top=0.5).mask.area() == 4 * 6
+    assert ones(output_of("below").mask.bits) == 6 * 6
+    assert ones(output_of("below", top=0.5).mask.bits) == 4 * 6
 
 
 def test_floats_are_probabilities():
@@ -43,7 +53,7 @@ def test_floats_are_probabilities():
 
 
 def test_a_function_can_ask_for_the_moment():
-    assert output_of("fails_on_13", Moment(12, 0)).mask.area() == 24
+    assert ones(output_of("fails_on_13", Moment(12, 0)).mask.bits) == 24
     with pytest.raises(StageError, match="stage fails_on_13 failed: ZeroDivisionError: no road"):
         output_of("fails_on_13", Moment(13, 0))
 

@@ -9,14 +9,9 @@ import numpy as np
 
 from roadeval.data import CERTAIN, Layer, Packed, Probability, best_code, histogram, mask_spec
 from roadeval.pipeline import stage
-from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
+from roadeval.pipeline.stage import NoSettings, Output, Stage, StageError, TrainingSet, View
 
 THRESHOLD: Final = mask_spec("threshold", "Road above the threshold of the training frames")
-
-
-@stage.stage_settings
-class ThresholdSettings:
-    """The threshold has no settings: all labelled pixels of the training frames decide."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +32,7 @@ def codes_of(opinion: Output | None) -> Probability:
     return opinion.probability
 
 
-def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
+def fit(sample: TrainingSet, _settings: NoSettings) -> Threshold:
     """Choose the threshold with the fewest wrong pixels among all labelled ones."""
     pairs = zip(sample.opinions, sample.truths, strict=True)
     counts = [histogram(codes_of(opinion), truth) for opinion, truth in pairs]
@@ -45,7 +40,7 @@ def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
 
 
 @stage.per_view
-def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
+def bind(_settings: NoSettings, learnt: Threshold, view: View) -> Output:
     """Return the pixels where road is more probable than the threshold."""
     road = Packed.of(codes_of(view.opinion) > learnt.code)
     facts = {"threshold": learnt.code / CERTAIN}
@@ -55,7 +50,7 @@ def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
 STAGE: Final = Stage(
     name="threshold",
     title="Threshold of the training frames",
-    settings=ThresholdSettings,
+    settings=NoSettings,
     bind=bind,
     layers=(THRESHOLD,),
     fit=fit,
