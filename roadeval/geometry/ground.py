@@ -241,7 +241,7 @@ def _find_lens(
         return None, Sentence("the focal length is missing: give fov, or focal, with {ground}")
     if problem := lens.problem:
         setting = f"ground.{problem.split()[0]}"
-        raise GroundError(f"its {problem}, which no camera has", setting=setting)
+        raise GroundError(f"impossible for a camera: its {problem}", setting=setting)
     if not lens.has_shape(*size):
         shapes = f"{lens.width}x{lens.height}, but the log's images are {size[0]}x{size[1]}"
         raise GroundError(f"the calibration is for images of {shapes}", setting="ground.size")

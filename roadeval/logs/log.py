@@ -398,21 +398,15 @@ class Log:
             of_camera = (number for number in numbers if images.frame_id(number) == camera)
             numbers = [*(of_camera if settings.labelled else islice(of_camera, most))]
             if not numbers:
-                raise LogError(
-                    f"no image of the range has {camera}; "
-                    f"the first has {images.frame_id(first) or 'none'}",
-                    where=self.path.name,
-                    setting="topics.frame_id",
-                )
+                has = f"the first has {images.frame_id(first) or 'none'}"
+                problem = f"no image of the range has {camera}; {has}"
+                raise LogError(problem, where=self.path.name, setting="topics.frame_id")
         if settings.labelled:
             numbers = [*islice(labelled_numbers(truth, images, numbers), most)] if truth else []
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
-                raise LogError(
-                    Sentence("leaves no frame: {}", why),
-                    where=self.path.name,
-                    setting="frames.labelled",
-                )
+                problem = Sentence("leaves no frame: {}", why)
+                raise LogError(problem, where=self.path.name, setting="frames.labelled")
         numbers = numbers[:: settings.every][: settings.max_frames]
         if only is not None:
             numbers = [number for number in numbers if number in only]

@@ -171,15 +171,11 @@ class LabelSettings:
         if mixed or (numbers and self.by_color):
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
-            raise SettingError(
-                Sentence("needs {road}"), setting="ignore", remedy="name the values that mean road"
-            )
+            remedy = "name the values that mean road"
+            raise SettingError(Sentence("needs {road}"), setting="ignore", remedy=remedy)
         if self.ignore_colors and not self.road_colors:
-            raise SettingError(
-                Sentence("needs {road_colors}"),
-                setting="ignore_colors",
-                remedy="name the colours that mean road",
-            )
+            needs, remedy = Sentence("needs {road_colors}"), "name the colours that mean road"
+            raise SettingError(needs, setting="ignore_colors", remedy=remedy)
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
 
@@ -331,8 +327,5 @@ class LogConfig:
     def __post_init__(self) -> None:
         is_audit = Path(self.truth.path, AUDIT).is_file()
         if self.truth.path and self.topics.truth and not is_audit:
-            raise LogError(
-                Sentence("says where the truth is, and so does {topics.truth}"),
-                setting="truth.path",
-                remedy="give one",
-            )
+            problem = Sentence("says where the truth is, and so does {topics.truth}")
+            raise LogError(problem, setting="truth.path", remedy="give one of them")

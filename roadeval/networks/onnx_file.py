@@ -39,7 +39,7 @@ LARGEST: Final = (1 << 31) - 1
 SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
 _LATE: Final = "takes longer than {:g} s{} to {}, or has no end"
-_MORE_TIME: Final = Sentence("mend it, or allow more by {net.seconds}")
+_MORE_TIME: Final = Sentence("export it again, or allow more time by {net.seconds}")
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
 _PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
 _PROBE: Final = """
@@ -219,7 +219,8 @@ def _open(
         late = _LATE.format(seconds, "", "open")
         raise NetworkError(late, where=path, remedy=_MORE_TIME) from error
     if ending.returncode not in (0, 1):
-        raise NetworkError("damaged: onnxruntime ends its process as it opens it", where=path)
+        remedy = "export the network as ONNX again"
+        raise NetworkError("damaged: it crashes onnxruntime", where=path, remedy=remedy)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # it raises what it logs

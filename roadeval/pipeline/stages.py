@@ -133,9 +133,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
         array = np.asarray(function(**{key: values[key] for key in values if key in arguments}))
         codes = None
         if array.ndim != 2:
-            raise ValueError(
-                f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask"
-            )
+            raise ValueError(f"it returned {array.dtype} {array.shape}, not an (H, W) mask")
         if array.dtype.kind == "f":
             if not ((array >= 0) & (array <= 1)).all():
                 raise ValueError("it returned floats that are no probabilities, from 0 to 1")
@@ -223,6 +221,5 @@ def check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpe
         shape = view.image.shape[:dimensions]
         if array.shape != shape or not any(np.issubdtype(array.dtype, kind) for kind in types):
             kinds = " or ".join(kind.__name__ for kind in types)
-            raise ValueError(
-                f"its {name} is {array.dtype} {array.shape}: it must be {kinds} {shape}"
-            )
+            made = f"{array.dtype} {array.shape}"
+            raise ValueError(f"its {name} is {made}: it must be {kinds} {shape}")

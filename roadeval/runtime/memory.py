@@ -12,8 +12,7 @@ from typing import Final
 from roadeval.runtime.sentence import Sentence
 
 LACKING: Final = Sentence(
-    "not enough memory: give it more, or let it take less, by fewer {run.jobs} or a "
-    "smaller {frames.scale}"
+    "not enough memory: take fewer {run.jobs}, a smaller {frames.scale}, or a larger machine"
 )
 _LACKING: Final = re.compile(
     "(allocat|map segment|new thread|create thread|Insufficient memory|out of memory|bad_alloc)",

@@ -156,9 +156,8 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
         if isinstance(error, ValidationError):
             first = error.errors(include_url=False)[0]
             reason = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"
-        raise ModelError(
-            f"a damaged model file: {reason}", where=path, remedy="train it again"
-        ) from error
+        problem = f"a damaged model file: {reason}"
+        raise ModelError(problem, where=path, remedy="train it again") from error
 
 
 def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:

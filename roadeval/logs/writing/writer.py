@@ -352,7 +352,7 @@ def _list_labels(masks: Path, images: Path) -> Sequence[Path]:
             raise
         refused = LogError.of(error)
         refused.remedy = (
-            "labels of an annotation tool are for the packed log: pack without them, then "
+            "labels of an annotation tool belong to the packed log: pack without them, then "
             f"roadeval replay LOG.mcap --truth {masks} --truth-images {images}"
         )
         raise refused from error
