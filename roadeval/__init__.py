@@ -12,8 +12,8 @@ True
 >>> recording.layer("filtered", "ndi", frame=12).shape
 (48, 64)
 
-Nothing here touches the process's own streams: what a C library of a codec writes to standard error
-by itself stays there, while the command line drops it.
+Messages that C libraries of codecs write to standard error are shown; only the command line drops
+them.
 """
 
 from importlib import import_module
@@ -91,7 +91,7 @@ _MODULES: Final = {
     "recording.recording": ("Recording",),
     "training.model": ("Model", "load_model", "save_model"),
 }
-"""The names of each module, which is imported when one of them is first used."""
+"""The public names of each module; a module is imported when one of its names is first used."""
 
 
 if not TYPE_CHECKING:  # there every name is known

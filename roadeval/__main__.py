@@ -1,4 +1,4 @@
-"""The program: ``roadeval``, or ``python -m roadeval`` with the Python that is named."""
+"""The program ``roadeval``, which ``python -m roadeval`` runs as well."""
 
 import signal
 import sys
@@ -8,9 +8,9 @@ from contextlib import suppress
 def main() -> int:
     """Run the command line of this process; return the exit code.
 
-    Until the command is loaded and has handlers of its own (see `roadeval.cli.signals`), there is
-    nothing to close: SIGINT ends the process as the system does, not with Python's traceback. Where
-    it is ignored, as behind ``nohup``, it stays so.
+    Until the command is loaded and has installed its handlers (see `roadeval.cli.signals`), SIGINT
+    ends the process without a traceback, since there is nothing to close. An ignored SIGINT, as
+    behind ``nohup``, stays ignored.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         with suppress(ValueError):  # only the main thread can

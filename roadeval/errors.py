@@ -1,4 +1,4 @@
-"""The one base of every error that a user can cause and mend."""
+"""The base class of all errors that a user can cause and correct."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class RoadevalError(Exception):
         self.in_file = False
         """Whether settings stand in a file, where flags do not name them."""
         self.draft = ""
-        """Lines of a file that mends it, once they are completed."""
+        """Lines of a file that corrects the problem, to be completed by the user."""
 
     @classmethod
     def of(cls, error: RoadevalError, where: object = "", *, in_file: bool = False) -> Self:
-        """Return an error of this class that is another one, with a place before its own."""
+        """Return another error as one of this class, with a place put before its own place."""
         made = cls.__new__(cls, *error.args)
         made.__dict__.update(error.__dict__)
         if where:
@@ -45,7 +45,7 @@ class RoadevalError(Exception):
         return made
 
     def rename_settings(self, rename: Callable[[str], str]) -> Self:
-        """Return the error with other names of its settings, for example those of another table."""
+        """Return the error with its settings renamed, for example to those of another table."""
         made = self.of(self)
         made.setting = rename(self.setting) if self.setting else ""
         for name in ("where", "problem", "remedy"):

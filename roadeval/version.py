@@ -1,4 +1,4 @@
-"""The version of the package, in a module of its own so that `--version` imports nothing else."""
+"""The version of the package, in a separate module so that `--version` imports nothing else."""
 
 from typing import Final
 

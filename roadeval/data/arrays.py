@@ -48,9 +48,8 @@ bit; bits beyond the width are 0. K masks are ``(K, H, words)``."""
 Words = npt.NDArray[np.uint64]
 """``(n,)``: 64 bits a word."""
 Reach = npt.NDArray[np.int64]
-"""A structuring element that is symmetric in both directions, ``(r + 1,)``: its extent in pixels to
-either side in the middle row, and in each of the r rows above and below; it never grows with the
-distance from the middle."""
+"""``(r + 1,)``: a structuring element that is symmetric in both directions. Entry i is its extent
+in pixels to either side, i rows above and below the middle row; the entries never increase."""
 
 
 def sigmoid(values: Values) -> Values:
@@ -63,7 +62,7 @@ TP: Final = 1
 FP: Final = 2
 FN: Final = 3
 IGNORED: Final = 4
-"""The outcome of a pixel, as a code. Recordings hold these codes: they do not change."""
+"""Codes of the outcome of a pixel. They never change, because recordings hold them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +85,6 @@ class Packed:
     def pixels(self) -> Plane:
         """Return ``(H, W)`` uint8, 0 or 1."""
         return unpack(self.bits, self.width)
-
-    def area(self) -> int:
-        """Count the pixels inside."""
-        return ones(self.bits)
 
 
 def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:

@@ -26,7 +26,7 @@ class Mounting:
 
     @property
     def has_body_axes(self) -> bool:
-        """Whether the camera's z points up, as a vehicle's, and not ahead."""
+        """Whether the camera's z axis points up, as a vehicle's does, and not ahead."""
         x, y, z, w = self.rotation
         return 1 - 2 * (x * x + y * y) > 0.5 > abs(2 * (y * z + x * w))
 
@@ -74,7 +74,7 @@ class Calibration:
 
     @property
     def doubt(self) -> str:
-        """Why its matrix is doubtful: its centre is far from the middle; else empty."""
+        """The reason to doubt the matrix, a centre far from the middle; empty without doubt."""
         x, y = self.matrix[2], self.matrix[5]
         if all(1 / 3 < at / side < 3 / 4 for at, side in ((x, self.width), (y, self.height))):
             return ""
@@ -97,7 +97,7 @@ class Calibration:
     ) -> Calibration:
         """Return the calibration of a part of the sensor whose pixels are binned.
 
-        As in ROS, the corner is subtracted first, and all is divided then. A centre in the exact
+        As in ROS, the corner is subtracted before the division by ``bins``. A centre in the exact
         middle stays there.
         """
         k, (across, down) = self.matrix, bins

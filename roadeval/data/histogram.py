@@ -12,7 +12,7 @@ from roadeval.data.frame import NON_ROAD, ROAD, Histogram, Probability, Truth
 CODES: Final = 1 << 16
 """Codes of a probability."""
 CERTAIN: Final = CODES - 1
-"""The code of a probability of 1; that of 0 is 0."""
+"""The code of a probability of 1; code 0 is a probability of 0."""
 
 
 def histogram(probability: Probability, truth: Truth) -> Histogram:
@@ -26,9 +26,9 @@ def histogram(probability: Probability, truth: Truth) -> Histogram:
 
 
 def wrong_above(counts: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Count the wrong pixels if road exceeds a code, for each code, ``(65536,)``.
+    """Return for each code, as threshold, the number of wrong pixels, ``(65536,)`` int64.
 
-    ``counts`` are ``(2, 65536)``: non-road and road.
+    Pixels above the threshold are called road. ``counts`` are ``(2, 65536)``: non-road and road.
     """
     other, road = counts.astype(np.int64).cumsum(axis=1)
     wrong: npt.NDArray[np.int64] = other[-1] - other + road
@@ -36,7 +36,7 @@ def wrong_above(counts: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 
 
 def best_code(counts: npt.NDArray[Any]) -> int:
-    """Return the code with the fewest errors if road exceeds it; the middle one of equals."""
+    """Return the threshold of `wrong_above` with the fewest errors; the middle one of equals."""
     wrong = wrong_above(counts)
     first = int(wrong.argmin())
     beyond = np.flatnonzero(wrong[first:] != wrong[first])

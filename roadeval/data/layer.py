@@ -49,7 +49,7 @@ class LayerSpec:
     classes: tuple[LabelClass, ...] = ()
     """For `LABELS` and `MASK`: the values that occur."""
     value_range: tuple[float, float] = (0.0, 1.0)
-    """For `SCALAR`: the closed range of meaning; values outside are clipped for display."""
+    """For `SCALAR`: least and greatest value to show; values outside are clipped for display."""
     exact: bool = True
     """Whether the recording must give back the same array (masks, labels, colours). A scalar map
     comes back as the nearest of 256 levels over ``value_range``. If the image has more than 800

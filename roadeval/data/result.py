@@ -107,7 +107,7 @@ class Output:
     regions: Mapping[str, Packed] = field(default_factory=dict)
     """Sets of pixels to count separately, by name."""
     facts: Mapping[str, float] = field(default_factory=dict)
-    """Numbers about the frame by name, as the ``threshold`` that was chosen."""
+    """Numbers about the frame by name, such as the chosen ``threshold``."""
     probability: Probability | None = None
     """The probability of road, if a threshold on it gives the mask."""
     by_class: tuple[Probability, ...] = ()
@@ -132,8 +132,8 @@ class StageResult:
 class VariantResult:
     """The outputs of a variant's stages for one frame, in the order they ran.
 
-    ``oracles`` has the road masks that the later stages make after a stage is replaced by the
-    truth, by the names of both stages. They are no results: see `roadeval.pipeline.chain.Chain`.
+    ``oracles[a][b]`` is the road mask of stage b after the output of stage a was replaced by the
+    truth. These masks are no results: see `roadeval.pipeline.chain.Chain`.
     """
 
     variant: str
@@ -186,7 +186,7 @@ class Doubt:
     differs: Mapping[str, float] = field(default_factory=dict)
     """The share of pixels in which each other variant's final mask differs."""
     flicker: float = math.nan
-    """The share of pixels that change from the frame before; NaN if that is missing."""
+    """The share of pixels that change from the frame before; NaN without such a frame."""
 
     @property
     def disagreement(self) -> float:
@@ -266,8 +266,8 @@ T = TypeVar("T")
 
 
 def as_tree(items: Iterable[tuple[tuple[str, str], T]]) -> dict[str, dict[str, T]]:
-    """Return a tree of items by two names, such as a variant's and a stage's."""
+    """Return items with two names, such as a variant's and a stage's, as a dict of dicts."""
     tree: dict[str, dict[str, T]] = {}
-    for (one, other), item in items:
-        tree.setdefault(one, {})[other] = item
+    for (outer, inner), item in items:
+        tree.setdefault(outer, {})[inner] = item
     return tree

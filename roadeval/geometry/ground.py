@@ -55,7 +55,7 @@ class Ground:
     distortion: tuple[float, ...] = ()
     """The coefficients of the model; four zeros for a fisheye without any."""
     is_posed: bool = True
-    """Whether `plane` comes from a place and angles, not only from a homography."""
+    """Whether the camera's place and angles are known, and not only a homography."""
 
     def scaled(self, width: int, height: int) -> Ground:
         """Return the ground for the same images in another size."""
@@ -82,9 +82,9 @@ class Ground:
         return _apply(_inverse(self.plane), rays)
 
     def distances(self) -> Floats:
-        """Return the metres to the ground at each pixel, ``(H, W)``; NaN where no ray is.
+        """Return the metres to the ground at each pixel, ``(H, W)``; NaN for pixels without a ray.
 
-        Above the horizon they are negative: to the plane that is as far above the camera.
+        Above the horizon they are negative: the metres to a plane as high above the camera.
         """
         rows, columns = np.mgrid[: self.height, : self.width].reshape(2, -1)
         rays = self.rays(np.column_stack([columns, rows]).astype(float))
@@ -93,16 +93,16 @@ class Ground:
             return (np.hypot(ahead, left) / below).reshape(self.height, self.width)
 
     def pixel_at(self, ahead: float) -> tuple[float, float]:
-        """Return the metres, along and across, that a pixel straight ahead covers, or NaN."""
+        """Return the metres, along and across, of a pixel ``ahead`` metres in front, or NaN."""
         (at,) = self.pixels(np.array([[ahead, 0.0]]))
         steps = np.array([[0, -0.5], [0, 0.5], [-0.5, 0], [0.5, 0]])
         up, down, left, right = self.places(at + steps)
         return float(np.linalg.norm(up - down)), float(np.linalg.norm(right - left))
 
     def moved(self, pitch: float = 0.0, height: float = 0.0) -> Ground:
-        """Return the ground for a camera that looks down by more degrees, and is higher by metres.
+        """Return the ground for a camera turned down by degrees and raised by metres.
 
-        A `GroundError` if its place and angles are unknown.
+        A `GroundError` if the camera's place and angles are unknown.
         """
         if not (pitch or height):
             return self
@@ -114,13 +114,13 @@ class Ground:
         return replace(self, plane=_plane(turn @ _rotation(LEFT, pitch).T, at))
 
     def axes(self) -> tuple[Floats, Floats]:
-        """Return the rotation from ahead, left, up to the camera's axes, and their origin there."""
+        """Return the rotation from ahead, left, up to the camera's axes, and the place of 0, 0."""
         first, second, third = np.reshape(self.plane, (3, 3)).T
         return np.stack([first, second, np.cross(first, second)], axis=1), third
 
     @cached_property
     def _curve(self) -> tuple[Floats, Floats]:
-        """Slopes of rays, and the distances of their pixels from the centre.
+        """Slopes of rays, and distances of their pixels from the centre in focal lengths.
 
         The curve ends where the polynomial folds: beyond, two rays would have the same pixel.
         """
@@ -133,7 +133,7 @@ class Ground:
     def rays(self, pixels: Floats) -> Floats:
         """Return the rays of pixels in units of the focal length, ``(n, 2)``: right, and down.
 
-        NaN if there is none, or one at more than a right angle to the camera's axis.
+        NaN for a pixel without a ray, or with one at more than a right angle to the camera's axis.
         """
         distorted = _apply(_inverse(self.matrix), pixels)
         if not self.distortion:
@@ -189,8 +189,8 @@ def ground_of(
     """Return the ground of a camera and its source, or None and what is missing.
 
     ``logged`` is the calibration in the log, for images of ``size``; ``settings`` replace parts of
-    it. Without both the text is empty. Only a roll of 0 is assumed, which the text says. A
-    `GroundError` if the settings make no camera.
+    it. The text is empty if there is neither. Only a roll of 0 is assumed, which the text says. A
+    `GroundError` if the settings are no possible camera.
     """
     if size is None or (logged is None and not settings.given):
         return None, ""
@@ -211,8 +211,7 @@ def ground_of(
     (near, _), (far, _) = (ground.pixel_at(ahead) for ahead in (10, 40))
     remarks = [f"metres: flat ground, {text}"]
     if math.isfinite(near + far):
-        covers = f"a pixel covers {near:.2g} m of the way 10 m ahead, {far:.2g} m at 40"
-        remarks.append(covers)
+        remarks.append(f"a pixel covers {near:.2g} m of the way 10 m ahead, {far:.2g} m at 40")
     if settings.focal and lens.doubt:
         remarks.append(lens.doubt)
     return ground, Sentence("; ").join(remarks)
@@ -242,17 +241,17 @@ def _find_lens(
         return None, Sentence("the focal length is missing: give fov, or focal, with {ground}")
     if problem := lens.problem:
         setting = f"ground.{problem.split()[0]}"
-        raise GroundError(f"its {problem}, which no camera has", setting=setting)
+        raise GroundError(f"impossible for a camera: its {problem}", setting=setting)
     if not lens.has_shape(*size):
-        shape = f"{lens.width}x{lens.height}, have another shape than the images"
-        raise GroundError(f"its images, {shape}, {size[0]}x{size[1]}", setting="ground.size")
+        shapes = f"{lens.width}x{lens.height}, but the log's images are {size[0]}x{size[1]}"
+        raise GroundError(f"the calibration is for images of {shapes}", setting="ground.size")
     last = max((n for n, number in enumerate(lens.distortion, 1) if number), default=0)
     model = lens.model.strip().lower()
     length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
     if length is None:
         model = f"{lens.model or 'without a name'} of {len(lens.distortion)} numbers"
         names = ", ".join(name for name, counts in COEFFICIENTS.items() if any(counts))
-        return None, f"the distortion is not known: {model}; known are {names}"
+        return None, f"unknown distortion model {model}; supported models are {names}"
     numbers = (*lens.distortion[:last], *(0.0,) * (length - last))
     return replace(lens, model=model, distortion=numbers), ""
 
@@ -280,9 +279,7 @@ def _find_plane(
             pitch = math.degrees(math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0])))
         if roll is None:
             roll = math.degrees(math.atan2(turn[2, 1], turn[2, 2]))
-        if (
-            height is None and mounting.parent == "base_footprint"
-        ):  # it lies on the ground (REP 120)
+        if height is None and mounting.parent == "base_footprint":  # on the ground (REP 120)
             height = mounting.translation[2]
     has_no_height = height is None or not 0.01 <= height <= 1000
     if height is None or pitch is None or has_no_height:
@@ -307,11 +304,11 @@ def _plane(turn: Floats, at: Floats) -> tuple[float, ...]:
 
 
 AHEAD, LEFT = 0, 1
-"""Axes of ahead, left and up."""
+"""Indices of the axes ahead, left and up."""
 
 
 def _rotation(axis: int, degrees: float) -> Floats:
-    """Return the rotation about an axis of ahead, left and up: about left, ahead goes down."""
+    """Return the rotation about an axis, ``(3, 3)``; a positive one about left turns ahead down."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     turn = np.eye(3)
     turn[first, first] = turn[second, second] = math.cos(math.radians(degrees))

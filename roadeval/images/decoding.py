@@ -1,8 +1,8 @@
 """Decoding of image files.
 
-`simplejpeg` reports damage that other decoders hide by filling it in; its pixels are those of
-OpenCV, bit for bit. Pillow reads all other formats, after it verified the checksums of a PNG.
-Damage that leaves a valid file cannot be found.
+`simplejpeg` reports damage that other decoders fill in silently, and gives the same pixels as
+OpenCV, bit for bit. Pillow reads all other formats, and checks a PNG's checksums first. Damage that
+leaves a valid file cannot be found.
 
 Images are turned by their EXIF orientation if the `Limits` say so.
 """
@@ -37,7 +37,7 @@ bytes can make the decoder walk through the image: 200 kB of scans would take ov
 
 
 def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
-    """Decode an image file to ``(H, W, 3)`` uint8 RGB; ``white`` is that of `eight_bits`.
+    """Decode an image file to ``(H, W, 3)`` uint8 RGB; `eight_bits` explains ``white``.
 
     Grey fills all channels, and opacity is left out. An `ImageError` if the file is damaged, of an
     unknown format, or too large.
@@ -124,7 +124,7 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
 
 
 def without_colours(image: Rgb) -> Array:
-    """Return one channel of an image if its three channels are equal, else the image itself."""
+    """Return one channel of an image if its three channels are equal, else the image."""
     grey = image[..., 0]
     same = np.array_equal(grey, image[..., 1]) and np.array_equal(grey, image[..., 2])
     return np.ascontiguousarray(grey) if same else image
@@ -223,7 +223,7 @@ def _jpeg_error(data: File, what: str) -> ImageError:
 
 
 def _decode(data: File, limits: Limits) -> Any:
-    """Return the pixels of a JPEG; for any other format a decoded image of Pillow's."""
+    """Return the pixels of a JPEG, or the loaded Pillow image of any other format."""
     format_ = _known_format(data)
     if format_.plugin is None:
         import simplejpeg
@@ -256,7 +256,7 @@ def _opened(data: File, format_: ImageFormat) -> Any:
 def _silence_pillow() -> None:
     """Keep Pillow and libtiff from printing: their exceptions are reported with the frame.
 
-    There is no switch for libtiff; if it is a separate library, nothing is changed.
+    libtiff prints until its handler is removed; a libtiff in a separate library keeps printing.
     """
     import ctypes
     import warnings

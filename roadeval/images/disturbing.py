@@ -30,7 +30,7 @@ FAR, SKY = 80.0, 300.0
 """Metres beyond which objects hide the ground (1/d^2 = 1/ground^2 + 1/FAR^2), and metres to the
 sky."""
 ROOFS: Final = 6.0
-"""How far houses and trees reach above the camera, by its height above the ground."""
+"""Height of houses and trees above the camera, in units of the camera's height above the ground."""
 WELL, READ_NOISE = 4096.0, 3.0
 """Electrons of a white pixel, and the standard deviation of a dark one."""
 
@@ -66,7 +66,7 @@ def exposure(image: Rgb, stops: float, *_: object) -> Rgb:
 
 
 def _noisy(light: Light, well: float, random: Random) -> Rgb:
-    """Add shot noise and read noise: of e electrons the variance is e + read^2 (EMVA 1288, 2.2)."""
+    """Add shot and read noise: the variance of e electrons is e + read^2 (EMVA 1288, 2.2)."""
     deviation = np.sqrt(light * np.float32(well) + np.float32(READ_NOISE**2))
     drawn = random.standard_normal(light.shape, np.float32)
     return to_codes(light + deviation * drawn / np.float32(well))
@@ -83,10 +83,9 @@ def dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
 
 
 def _veil(light: Light, per_metre: float, depth: Light) -> tuple[Light, np.float32]:
-    """Fade light into the air's, L t + A (1 - t) with t = exp(-b d) (Koschmieder, 1924).
+    """Return light faded into the air's, L t + A (1 - t), t = exp(-b d) (Koschmieder, 1924), and A.
 
     A is 0.6 of the brightest hundredth of the image; bright pixels above the horizon are sky.
-    Returned is also A.
     """
     grey = light.mean(axis=2)
     brightest = np.float32(np.percentile(grey[::4, ::4], 99) + 1e-6)
@@ -128,7 +127,7 @@ def _spots(height: int, width: int, strength: float) -> Light:
 
 
 def dirt(image: Rgb, strength: float, *_: object) -> Rgb:
-    """Look through 12 soft spots a strength, which dim and scatter light (Gu et al., 2009, eq. 2).
+    """Add 12 x strength soft spots, which dim and scatter light (Gu et al., 2009, eq. 2).
 
     A covered pixel keeps a fifth of its light, and gets a quarter of the image's mean.
     """
@@ -140,8 +139,8 @@ def dirt(image: Rgb, strength: float, *_: object) -> Rgb:
 def rain(image: Rgb, strength: float, depth: Light, random: Random) -> Rgb:
     """Fade as in rain of R = 25 mm/h x strength, b = 0.312 R^0.67 / km (Halder et al., 2019).
 
-    Then 300 streaks a strength, near ones longer: L (1 - a) + A a, with the light A of the air,
-    which drops refract (Garg and Nayar, 2007).
+    Then draw 300 x strength streaks, near ones longer: L (1 - a) + A a, with the light A of the
+    air, which drops refract (Garg and Nayar, 2007).
     """
     import cv2
 
@@ -228,7 +227,7 @@ class Disturbance(NamedTuple):
 
     @property
     def is_signed(self) -> bool:
-        """Whether strengths below 0 mean something; a result may have kinds that are not here."""
+        """Whether strengths may be negative; False for a kind that is not installed here."""
         return self.kind in kinds() and kinds()[self.kind].least < 0
 
     def __str__(self) -> str:
@@ -238,8 +237,7 @@ class Disturbance(NamedTuple):
     def of(self, image: Rgb, frame: int, depth: Light | None = None) -> Rgb:
         """Return an image, ``(H, W, 3)`` uint8 RGB, with this disturbance.
 
-        ``frame`` seeds what is drawn at random; ``depth`` is that of `Apply`, by default
-        of `assumed_depth`.
+        ``frame`` seeds the random numbers; ``depth`` is as in `Apply`, by default `assumed_depth`.
         """
         if self.strength == 0:
             return image
@@ -251,9 +249,9 @@ class Disturbance(NamedTuple):
 
 @lru_cache(4)
 def assumed_depth(height: int, width: int) -> Light:
-    """Return the metres to flat ground by row, h f / (row - horizon), of a camera of a usual car.
+    """Return the metres to flat ground at each pixel, h f / (row - horizon), for a usual car.
 
-    It is at h = 1.4 m, with f = 0.8 of the width and the horizon at 45 % of the height.
+    Its camera is at h = 1.4 m, with f = 0.8 of the width and the horizon at 45 % of the height.
     """
     metres = 1.4 * 0.8 * width / (np.arange(height) - 0.45 * height + 0.01)
     return np.repeat(metres.astype(np.float32)[:, None], width, axis=1)

@@ -15,7 +15,7 @@ MAX_PIXELS: Final = 1 << 25
 
 
 class ImageError(RoadevalError, ValueError):
-    """An image that is damaged, of an unknown format, or too large; it continues "frame 7: "."""
+    """An image that is damaged, too large, or of an unknown format; it follows "frame 7: "."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ImageFormat(NamedTuple):
 
     name: str
     skipped: int
-    """Bytes before the magic ones."""
+    """Number of bytes before the magic bytes."""
     magic: bytes
     plugin: str | None
     """Name of its module and class in Pillow; None for JPEG, which another library reads."""

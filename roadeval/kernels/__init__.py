@@ -1,4 +1,4 @@
-"""Loops over every pixel that no library offers in one pass.
+"""Loops over all pixels that no library offers in one pass.
 
 Each exists twice: in C (`compiled`), and as the NumPy or OpenCV expression that defines it
 (`plain`). Both return the same bits, so that results never depend on the machine. `KERNELS` are the

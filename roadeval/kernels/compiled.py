@@ -1,9 +1,9 @@
 """The compiled kernels, by the names of their twins in `plain`.
 
 The loops are in C, in the folder ``c``, and built when the package is installed. The functions here
-allocate the arrays that a loop writes, and check shapes, a `ValueError` if they do not fit
-together; an array of another type, dimension or order than a loop takes is a `TypeError`. Rows,
-columns and labels in runs are trusted: they come from `components` of an image of the same size.
+allocate the arrays that a loop writes. They raise a `ValueError` for shapes that do not fit
+together, and a `TypeError` for an array of a wrong type, dimension or order. Rows, columns and
+labels in runs are not checked: they come from `components` of an image of the same size.
 """
 
 from __future__ import annotations
@@ -221,5 +221,5 @@ LOOPS: Final = [
     if isfunction(value) and value.__module__ == __name__ and name[0] != "_"
 ]
 if lacking := [name for name in LOOPS if not hasattr(_loops, name)]:
-    # The checkout was updated, and not installed again since.
-    raise ImportError(f"the compiled loops are of an earlier state: no {', '.join(lacking)}")
+    # The checkout was updated, but not installed again.
+    raise ImportError(f"the compiled loops are older than this file: no {', '.join(lacking)}")

@@ -10,7 +10,7 @@ class LogError(RoadevalError):
 
 
 class UnclearLabelsError(LogError):
-    """Values of labels whose meaning only the user knows."""
+    """Values of labels with a meaning that only the user knows."""
 
 
 class FrameError(RoadevalError):

@@ -76,7 +76,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or those of a rosbag2 folder in natural order.
 
     Files of a folder that are no MCAP files, or are missing, are returned as damage. A file is
-    missing if the folder's `METADATA` lists it, or if its number, from 0, lacks among the others. A
+    missing if the folder's `METADATA` lists it, or if the others' numbers, from 0, have a gap. A
     `LogError` if there is no MCAP file; it names the files there, and how to convert them.
     """
     if not path.is_dir():
@@ -224,7 +224,7 @@ def prefer_ids(labels: Sequence[Path]) -> Sequence[Path]:
 
 
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
-    """Find the image of each label by its name, unchanged, `bare_name`, or without shared ends."""
+    """Return each label's image by its name: unchanged, `bare_name`, or without shared ends."""
     exact, loose = {file.stem: file for file in images}, {bare_name(file): file for file in images}
     names = without_hashes([*map(bare_name, labels)])
     ends = [len(part) for part in _shared([name[::-1] for name in names])]
@@ -242,7 +242,7 @@ def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, P
 
 
 def _shared(names: Sequence[str]) -> list[str]:
-    """Return the begin that all names share, up to each of its separators, the shortest first."""
+    """Return the prefix that all names share, up to each of its separators, shortest first."""
     pairs = zip(min(names, default=""), max(names, default=""), strict=False)
     common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     return ["", *(common[: mark.end()] for mark in re.finditer(r"[^0-9A-Za-z]+", common))]

@@ -198,7 +198,10 @@ def settle(
     *,
     of_rig: bool = False,
 ) -> Selection:
-    """Choose from a log's topics; see `choose_truth` for ``of_rig``, `Log.select` for errors."""
+    """Return the selection of a log's topics; `choose_truth` explains ``of_rig``.
+
+    Errors are those of `Log.select`.
+    """
     settings = config.topics
     topics = [_with_frame_id(topic, readers[topic.name], settings.frame_id) for topic in topics]
     image, why = choose_image(topics, settings.image)
@@ -549,7 +552,7 @@ class FrameStream:
     def unpaired(self) -> Iterator[str]:
         """Yield a sentence on labels without a frame, and on frames that lost their label.
 
-        If frames between others are not read, nothing is known of their labels.
+        It yields none if frames in between are not read, since their labels are unknown.
         """
         first, last, frames = self.numbers[0], self.numbers[-1], len(self.numbers)
         for name, (source, partners) in self._labels.items():
@@ -607,7 +610,7 @@ class FrameStream:
 
 
 def look_at_images(selection: Selection) -> Iterator[str]:
-    """Look at some images of a camera; yield a sentence on each thing to know before a replay."""
+    """Decode some images of a camera; yield the warnings to show before a replay."""
     images = selection.camera.images
     places = [*range(min(LOOKED_AT, len(images)))]
     if images.is_small and selection.image.kind is not TopicKind.VIDEO:
@@ -620,7 +623,7 @@ def look_at_images(selection: Selection) -> Iterator[str]:
 
 
 def are_few(images: TopicReader, numbers: Sequence[int]) -> bool:
-    """Return whether some images between these lie in chunks that these do not need."""
+    """Return whether reading only these images needs fewer chunks than reading all in between."""
     between = range(numbers[0], numbers[-1] + 1)
     return images.chunks_of(numbers) < images.chunks_of(between)
 

@@ -68,7 +68,7 @@ class Traffic:
 
 @dataclass(frozen=True, eq=False)
 class RemoteLog:
-    """A log that lies elsewhere: one file."""
+    """A remote log, which is one file."""
 
     source: str
     """Its URL, without secrets."""
@@ -167,7 +167,7 @@ class Log:
     beside: list[Log] = field(default_factory=list)
     """Other logs that hold labels; they are closed with this one."""
     by_summary: bool = False
-    """Whether of its messages only the first ones are there."""
+    """Whether only the first messages are read, see `outline_of`."""
     traffic: Traffic | None = None
     """The requests and bytes that a log elsewhere has cost so far; None for one on a disk."""
 
@@ -253,7 +253,7 @@ class Log:
         return parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
 
     def select(self) -> Selection:
-        """Choose what to replay: topics that the settings name, else those without doubt.
+        """Return what to replay: the topics that the settings name, else the only candidates.
 
         Another log that holds masks stays open as long as this one. A `LogError` if a topic is
         missing or the choice is doubtful, a label value does not occur or has no clear meaning, a
@@ -398,21 +398,15 @@ class Log:
             of_camera = (number for number in numbers if images.frame_id(number) == camera)
             numbers = [*(of_camera if settings.labelled else islice(of_camera, most))]
             if not numbers:
-                raise LogError(
-                    f"no image of the range has {camera}; "
-                    f"the first has {images.frame_id(first) or 'none'}",
-                    where=self.path.name,
-                    setting="topics.frame_id",
-                )
+                has = f"the first has {images.frame_id(first) or 'none'}"
+                problem = f"no image of the range has {camera}; {has}"
+                raise LogError(problem, where=self.path.name, setting="topics.frame_id")
         if settings.labelled:
             numbers = [*islice(labelled_numbers(truth, images, numbers), most)] if truth else []
             if not numbers:
                 why = selection.no_truth or "no frame of the range has road truth"
-                raise LogError(
-                    Sentence("leaves no frame: {}", why),
-                    where=self.path.name,
-                    setting="frames.labelled",
-                )
+                problem = Sentence("leaves no frame: {}", why)
+                raise LogError(problem, where=self.path.name, setting="frames.labelled")
         numbers = numbers[:: settings.every][: settings.max_frames]
         if only is not None:
             numbers = [number for number in numbers if number in only]
@@ -421,7 +415,7 @@ class Log:
     def write_excerpt(self, topic: str, first: int, last: int, path: Path) -> None:
         """Write the messages of all topics from 2 s before an image to the end of a later one.
 
-        Messages of before the span, as calibrations, stand at its beginning. Messages that cannot
+        Earlier messages that a replay needs, such as calibrations, come first. Messages that cannot
         be read are left out, see `losses`. A `LogError` if the file cannot be written.
         """
         images, times = self.readers[topic], self.readers[topic].log_times.tolist()
@@ -486,7 +480,7 @@ class LogDescription:
     traffic: Traffic | None = None
     """The requests and bytes that a log elsewhere has cost so far; None for one on a disk."""
     misfits: tuple[str, ...] = ()
-    """How truth that lies beside the log does not fit its images, a sentence each."""
+    """Reasons why truth beside the log does not fit its images, a sentence each."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the description as JSON objects."""
@@ -509,7 +503,7 @@ def describe(
     unreadable, or no MCAP log.
     """
     config = config or LogConfig()
-    # Labels beside the log, and the images of one of several cameras, are sought all over it.
+    # Labels beside the log, and the images of one of several cameras, may be anywhere in it.
     needs_all = verify or config.truth.path or config.masks or config.topics.frame_id is not None
     with open_log(path, config, by_summary=by_summary and not needs_all) as log:
         picks, problem = tuple[str, ...](), ""

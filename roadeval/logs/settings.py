@@ -152,8 +152,8 @@ class LabelSettings:
     ignore: Truth values, or names of classes, that are not counted.
     road_colors: Truth colours that mean road, as red, green and blue.
     ignore_colors: Truth colours that are not counted.
-    names: Names of classes by their values, or by their colours such as ``"64,32,32"``; labels can
-        be called by them. Default: those of a ``vision_msgs/LabelInfo`` beside the labels' topic.
+    names: Names of classes by their values, or by their colours such as ``"64,32,32"``, for use in
+        ``road`` and ``ignore``. Default: a ``vision_msgs/LabelInfo`` beside the labels' topic.
     """
 
     road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
@@ -171,15 +171,11 @@ class LabelSettings:
         if mixed or (numbers and self.by_color):
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
-            raise SettingError(
-                Sentence("needs {road}"), setting="ignore", remedy="name the values that mean road"
-            )
+            remedy = "name the values that mean road"
+            raise SettingError(Sentence("needs {road}"), setting="ignore", remedy=remedy)
         if self.ignore_colors and not self.road_colors:
-            raise SettingError(
-                Sentence("needs {road_colors}"),
-                setting="ignore_colors",
-                remedy="name the colours that mean road",
-            )
+            needs, remedy = Sentence("needs {road_colors}"), "name the colours that mean road"
+            raise SettingError(needs, setting="ignore_colors", remedy=remedy)
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
 
@@ -191,11 +187,10 @@ class LabelSettings:
     def with_values(
         self, where: str, names: Mapping[str, str] | None = None, classes: Collection[str] = ()
     ) -> LabelSettings:
-        """Return the settings with the values, or colours, of classes that they call by name.
+        """Return the settings with values, or colours, in place of the names of classes.
 
-        ``names`` are further names by value, which the log tells: none of colours. ``classes`` are
-        names that stand in the labels themselves. A `LogError` if there are names, but a class is
-        none of them.
+        ``names`` are further names by value, from the log. ``classes`` are names that stand in the
+        labels themselves. A `LogError` if there are names, but a class is none of them.
         """
         names = self.names if self.by_color else {**(names or {}), **self.names}
         chosen = dict[str, Any]()
@@ -222,17 +217,17 @@ class LabelPlace:
     path: Folder of labels, one a frame (images, NPY); COCO, CVAT, LabelMe, YOLO, Label Studio,
         Cityscapes, BDD100K, VIA; or LOG.mcap:/topic. In the path ``{drive}`` is the name of the
         drive's file without its ending.
-    pair: The pairing of labels with frames: by ``number``, by which the labels' names differ, or by
+    pair: The pairing of labels with frames: by the ``number`` in the labels' names, or by the
         ``stamp``, if each name is a time (seconds, or milli-, micro- or nanoseconds since 1970).
         Default: stamps for a log, and for files if all names are times of more than ten digits.
-    first: The number of the first frame's label. Default: the only one that the numbers allow.
+    first: The number of the first frame's label. Default: found, if the labels' numbers allow one.
     names: A pattern of the names of labels to read, such as ``left/*`` for one of several cameras.
         In ``*_{number}_v?.png`` the part ``{number}`` is the frame's number; ``*`` and ``?`` are
         any text and any letter.
     images: The folder of the images in the log, in their order: a label belongs to the image of the
         same name, without endings such as ``_mask``. It may contain ``{drive}``.
-    skip_roadless: Only drawn labels that contain road. Otherwise an image with shapes of other
-        classes alone counts as one without road.
+    skip_roadless: Only drawn labels that contain road. By default an image with shapes of other
+        classes alone counts as an image without road.
     """
 
     path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
@@ -257,7 +252,7 @@ class MaskSettings(LabelPlace):
         16 bits are divided by the greatest one.
     decide: For confidence maps: ``threshold``, or ``trained`` for the one with the fewest errors on
         the training frames.
-    labels: For masks of other values than 0 and 255 (road), or 0 and 1 (road): their meaning.
+    labels: The meaning of masks with other values than 0 and 255 (road), or 0 and 1 (road).
     """
 
     threshold: Annotated[float | None, Interval(gt=0, le=1)] = None
@@ -279,21 +274,21 @@ class FrameSettings:
     start: First time: seconds from the log's start, nanoseconds, or RFC 3339.
     end: End time, exclusive.
     every: Step from frame to frame: 5 reads every fifth one.
-    labelled: Only frames that have truth. Windows and flicker are of consecutive ones of these,
-        however far apart they are.
+    labelled: Only frames that have truth. Windows and flicker then join neighbouring labelled
+        frames, however far apart they are.
     max_frames: Greatest number of frames to read.
-    scale: Share of their width and height to which frames and truth are reduced. A smaller one is
-        quicker and coarser, and gives other results.
-    disturb: Disturbance of the evaluated frames, as fog:2, under which every variant is scored once
-        more: dark, fog, blur, dirt, rain, jpeg, noise or exposure, and its strength.
+    scale: Factor by which width and height of frames and truth are reduced. A smaller one is faster
+        and coarser, and gives other results.
+    disturb: Disturbances of the evaluated frames with their strengths, such as fog:2, under which
+        every variant is scored again: dark, fog, blur, dirt, rain, jpeg, noise or exposure.
     max_pixels: Greatest number of pixels of an image. Larger images are not decoded: a damaged head
         may claim any size.
     unturned: Images as they are stored, without the turn of their EXIF orientation or a video's
         display matrix. Viewers and annotation tools turn them; calibrations are for the sensor.
-    full_range: A luma of 0 to 255 in videos, as in converted JPEGs, whatever they state. Default:
-        the range that a video states, else 16 to 235.
-    white: The sample that is white in images of more than 8 bits. Default: the greatest number of
-        8, 10, 12, 14 or 16 bits, as many as the samples of some images need; 1 for fractions.
+    full_range: A luma range of 0 to 255 for videos, as in converted JPEGs. Default: the range that
+        a video states, else 16 to 235.
+    white: The sample value of white in images of more than 8 bits. Default: the greatest value of
+        8, 10, 12, 14 or 16 bits, the fewest that hold the samples of some images; 1 for fractions.
     """
 
     start: Annotated[Time | None, Flag("-S --start", "TIME")] = None
@@ -314,7 +309,7 @@ class FrameSettings:
 
 
 AUDIT: Final = "audit.json"
-"""The file in a folder of labels to correct: the drive's own labels are read, too."""
+"""The file that marks a folder of corrected labels: the drive's other labels are read, too."""
 
 
 @dataclass(frozen=True)
@@ -332,8 +327,5 @@ class LogConfig:
     def __post_init__(self) -> None:
         is_audit = Path(self.truth.path, AUDIT).is_file()
         if self.truth.path and self.topics.truth and not is_audit:
-            raise LogError(
-                Sentence("says where the truth is, and so does {topics.truth}"),
-                setting="truth.path",
-                remedy="give one",
-            )
+            problem = Sentence("says where the truth is, and so does {topics.truth}")
+            raise LogError(problem, setting="truth.path", remedy="give one of them")

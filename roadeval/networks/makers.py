@@ -1,4 +1,4 @@
-"""The statements of a network's makers: metadata of Ultralytics, JSON files of Hugging Face."""
+"""Settings and class names that a network's makers state: Ultralytics' and Hugging Face's."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST: Final = 4 << 20
 FILTERS: Final[Mapping[Any, Any]] = {2: True, 3: "bicubic"}
 """Values of ``antialias`` by the number of a filter in Pillow."""
 UNFIT: Final = ("do_center_crop", "do_pad", "keep_aspect_ratio")
-"""Steps of preprocessing after which an input does not show the whole frame, or more."""
+"""Steps of preprocessing after which the input shows a part of the frame, or more than it."""
 
 
 def find_network(folder: Path) -> Path:
@@ -37,7 +37,7 @@ def find_network(folder: Path) -> Path:
 
 @contextmanager
 def reading(path: Path, problem: str) -> Iterator[None]:
-    """Turn an error of reading into one line."""
+    """Turn an error of reading inside the block into a `NetworkError` with one line."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -72,7 +72,7 @@ def names_in(metadata: Mapping[str, str]) -> dict[int, str]:
 
 
 def settings_in(metadata: Mapping[str, str]) -> NetSettings:
-    """Return the settings that metadata state: of Ultralytics a letterbox, and its size."""
+    """Return the settings in Ultralytics' metadata, a letterbox and its size; else none."""
     if not is_ultralytics(metadata):
         return NetSettings()
     stated = NetSettings(resize="letterbox")
@@ -117,7 +117,7 @@ def input_settings(folder: Path, content: bytes) -> NetSettings:
     if made.get("do_normalize", True):
         for key, name in (("image_mean", "mean"), ("image_std", "deviation")):
             if key not in made:
-                raise NetworkError(f"lacks {key}", where=path, remedy="write it in")
+                raise NetworkError(f"lacks {key}", where=path, remedy="add it")
             values[name] = made[key] if isinstance(made[key], list) else [made[key]]
     if made.get("do_flip_channel_order"):
         values["channels"] = "bgr"

@@ -1,4 +1,4 @@
-"""A network's road mask of a frame; missing settings are read from its file, or asked for."""
+"""The road mask that a network gives for a frame, and the settings that its file completes."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Network:
         }
 
     def reading(self) -> str:
-        """Return what is taken: ``road = class 0 "road" of 19; letterbox 8x8; logits at 1/4``."""
+        """Return how outputs are read: ``road = class 0 of 19; letterbox 8x8; logits at 1/4``."""
         settings, file = self.settings, self.file
         assert settings.size is not None
         scores = as_scores(np.empty(self.shapes[0], np.int8), settings.layout)
@@ -114,7 +114,7 @@ class Network:
     def _codes(
         self, output: Array, frame: Size, settings: NetSettings
     ) -> tuple[Probability, list[Probability]]:
-        """Return the codes of road, and the codes of each of its classes, if they are graded."""
+        """Return the codes of road, and of each class of road; none by class for class numbers."""
         scores = as_scores(output, settings.layout)
         assert scores is not None
         if not np.isfinite(scores).all():
@@ -195,7 +195,7 @@ Size = tuple[int, int]
 
 
 def inside(frame: Size, settings: NetSettings) -> tuple[slice, slice]:
-    """Return the rows and columns of a frame in the input: they are in the middle."""
+    """Return the rows and columns in the middle of the input that show the frame."""
     assert settings.size is not None
     width, height = settings.size
     if settings.resize == "stretch":
@@ -211,7 +211,7 @@ def inside(frame: Size, settings: NetSettings) -> tuple[slice, slice]:
 
 
 def fit_size(settings: NetSettings, frame: Size) -> NetSettings:
-    """Return settings with the size of the input for a frame; it differs if there is a stride."""
+    """Return settings with the input's size for this frame, which a stride may reduce."""
     if settings.stride is None or settings.resize != "letterbox" or settings.size is None:
         return settings
     rows, columns = inside(frame, settings)
@@ -265,7 +265,7 @@ def input_values(image: Rgb, settings: NetSettings, dtype: str) -> Array:
 
 
 STATED: Final = ("resize", "antialias", "layout", "channels", "scale", "mean", "deviation")
-"""Settings that hold as the makers state them, whatever the shapes are."""
+"""Settings that are taken from the makers if the user does not give them."""
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
 
@@ -321,7 +321,7 @@ class Sample:
     integral: bool
     """Whether all its numbers are integers."""
     several: bool
-    """Whether it had more numbers than `MOST_CLASSES`."""
+    """Whether it has more different integers than `MOST_CLASSES`."""
 
     @classmethod
     def of(cls, arrays: Sequence[Array]) -> Sample:
@@ -391,7 +391,7 @@ _VARIES: Final = (
 def has_instances(file: OnnxFile) -> bool:
     """Return whether a file finds objects one by one, by its metadata or its outputs.
 
-    Such a file has a list of objects beside masks: an output of three lengths that is no map.
+    Such a file has a list of objects beside masks: an output of three dimensions that is no map.
     """
     names = " ".join(tensor.name.lower() for tensor in file.outputs)
     shapes = [tensor.shape for tensor in file.outputs]
@@ -406,8 +406,8 @@ def has_instances(file: OnnxFile) -> bool:
 def as_scores(output: Array, layout: str | None) -> Array | None:
     """Return an output as classes, rows and columns; None if it is no map of the image.
 
-    A map is ``(1, C, h, w)``, or ``(1, h, w, C)`` if the input's layout is ``NHWC``; the length of
-    1, or the classes, may be absent.
+    A map is ``(1, C, h, w)``, or ``(1, h, w, C)`` if the input's layout is ``NHWC``; the first
+    dimension, or that of the classes, may be absent.
     """
     array = output[0] if output.ndim > 2 and len(output) == 1 else output
     if array.ndim == 3 and layout == "NHWC" and len(array) != 1:
@@ -426,11 +426,11 @@ def check_image(file: OnnxFile) -> None:
     if len(shape) == 4 and taken.dtype == "int8":
         raise file.question("takes int8 by a scale that it does not state: export float inputs")
     if len(shape) != 4 or taken.dtype not in FED:
-        raise file.question("takes no image: that is one input of four lengths, the first one 1")
+        raise file.question("takes no image: export it with one input of shape (1, C, H, W)")
 
 
 def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """Complete the settings of the input."""
+    """Return settings with all values of the input."""
     check_image(file)
     shape, dtype = file.inputs[0].shape, file.inputs[0].dtype
     stated = asdict(file.stated)
@@ -449,7 +449,7 @@ def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     )
     if settings.layout is None and count not in (1, 3):
         give = Sentence("give it by {net.layout}")
-        problem = "does not say the order of its input's lengths"
+        problem = "does not say the order of its input's dimensions"
         raise file.question(problem, give, 'layout = ?  # "NCHW" or "NHWC"', settings)
     settings = replace(settings, layout=layout)
     size = settings.size or ((columns, rows) if columns and rows else file.stated.size)
@@ -478,7 +478,7 @@ def complete_input(settings: NetSettings, file: OnnxFile) -> NetSettings:
 def complete_output(
     settings: NetSettings, file: OnnxFile, name: str, sample: Sample
 ) -> NetSettings:
-    """Complete the settings of an output, by its sample on test images."""
+    """Return settings completed by an output's sample on test images."""
     assert settings.size is not None
     width, height = settings.size
     scores = as_scores(np.broadcast_to(np.int8(), sample.shape), settings.layout)
@@ -522,7 +522,7 @@ def complete_output(
 
 
 def complete_classes(settings: NetSettings, file: OnnxFile, name: str) -> NetSettings:
-    """Complete the settings of a network whose output holds numbers of classes."""
+    """Return complete settings for an output that holds numbers of classes."""
     if settings.threshold is not None:
         leave = Sentence("leave {net.threshold} out")
         raise file.question(f"its output {name!r} holds only classes", leave)
@@ -539,9 +539,9 @@ LIKE_ROAD: Final = ("road", "driv", "street", "lane", "asphalt", "highway", "car
 def choose_road(
     settings: NetSettings, file: OnnxFile, problem: str, count: int | None = None
 ) -> tuple[int, ...]:
-    """Return the classes of road: those that settings name, those called road, or the last of two.
+    """Return the classes of road: those in the settings, those called road, or the last of two.
 
-    A `NetworkError` that begins with the problem, and names those like road, if there are none.
+    A `NetworkError` if there is none: it begins with ``problem`` and lists names like road.
     """
     names = {n: name for n, name in file.names.items() if count is None or n < count}
     default = (count - 1,) if count == 1 or (count == 2 and not names) else ()

@@ -31,7 +31,7 @@ from roadeval.runtime.threads import time_limit
 Array = npt.NDArray[Any]
 
 LEAST_OPENING_S: Final = 30.0
-"""Seconds that a file may take to open, however few an image may take."""
+"""Seconds that a file may take to open, even if an image may take fewer."""
 QUOTED: Final = 240
 """Letters of onnxruntime's error that a message quotes."""
 LARGEST: Final = (1 << 31) - 1
@@ -39,7 +39,7 @@ LARGEST: Final = (1 << 31) - 1
 SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
 _LATE: Final = "takes longer than {:g} s{} to {}, or has no end"
-_MORE_TIME: Final = Sentence("mend it, or allow more by {net.seconds}")
+_MORE_TIME: Final = Sentence("export it again, or allow more time by {net.seconds}")
 _DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
 _PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
 _PROBE: Final = """
@@ -59,7 +59,7 @@ class Tensor:
     dtype: str
     """NumPy's name of its type; onnxruntime's if NumPy lacks the type."""
     shape: tuple[int | None, ...]
-    """Its lengths; None for a variable one."""
+    """The sizes of its dimensions; None for a variable one."""
 
     @classmethod
     def of(cls, described: Any) -> Tensor:
@@ -89,7 +89,7 @@ class OnnxFile:
     names: Mapping[int, str]
     """Names of classes by number, in small letters, as far as its makers state them."""
     stated: NetSettings
-    """Settings that its makers state; a size stands for an input that takes any."""
+    """Settings that its makers state; the size is for an input that takes any size."""
 
     def run(
         self, values: Array, outputs: tuple[str, ...], seconds: float, grown: float = math.inf
@@ -173,7 +173,7 @@ def load(settings: NetSettings) -> OnnxFile:
     state = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
     file = _open(path, settings.seconds, documents, *state)
     if settings.sha256 not in (None, file.sha256):
-        other = "is another network than was asked for: {net.sha256} says {}, and its own is {}"
+        other = "is another network than was asked for: {net.sha256} is {}, but the file's is {}"
         raise file.error(Sentence(other, settings.sha256, file.sha256))
     return file
 
@@ -219,7 +219,8 @@ def _open(
         late = _LATE.format(seconds, "", "open")
         raise NetworkError(late, where=path, remedy=_MORE_TIME) from error
     if ending.returncode not in (0, 1):
-        raise NetworkError("damaged: onnxruntime ends its process as it opens it", where=path)
+        remedy = "export the network as ONNX again"
+        raise NetworkError("damaged: it crashes onnxruntime", where=path, remedy=remedy)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # it raises what it logs
@@ -254,8 +255,8 @@ def explaining(path: Path) -> Iterator[None]:
         raise NetworkError(f"{library} cannot run the network: {quoted}", where=path) from error
 
 
-# An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. Any other file is a
-# ValueError.
+# An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. Any other file
+# raises a ValueError.
 
 HOLDING: Final[Mapping[str, Mapping[int, str]]] = {
     "model": {7: "graph", 20: "training", 25: "function"},

@@ -27,33 +27,32 @@ class NetSettings:
 
     file: The network: an ONNX file, or a folder of Hugging Face with ``model.onnx``,
         ``config.json`` and ``preprocessor_config.json``.
-    sha256: SHA-256 of the network's bytes, followed by those of its weight files and of the JSON
-        files of its folder, in hexadecimal: any other file is an error.
+    sha256: Expected SHA-256, in hexadecimal, of the network's bytes, followed by its weight files
+        and the JSON files of its folder. A network with another one is an error.
     size: Width and height of the input in pixels. Default: those that the file states.
     resize: Way to resize an image to the input, with linear interpolation. ``stretch``, the
-        default: each side by itself. ``letterbox``, the way of Ultralytics' networks: both sides by
-        one factor until the image fits, in the middle of a grey area.
-    stride: Number of pixels of which the sides of a letterbox are multiples, each as short as the
-        image allows: for a network that takes any size. Default: all letterboxes have ``size``.
-    antialias: Whether a pixel of a reduced image is a mean of all pixels that it covers, as by
-        Pillow's bilinear filter; ``bicubic`` takes that filter. Default: no, of Hugging Face yes.
+        default: each side by itself. ``letterbox``, as for Ultralytics' networks: both sides by one
+        factor, so that the image fits into the middle of a grey area.
+    stride: The sides of a letterbox are the least multiples of this number of pixels that hold the
+        image, for a network that takes any size. Default: all letterboxes have ``size``.
+    antialias: Whether a pixel of a reduced image is a mean of all pixels that it covers, as with
+        Pillow's bilinear filter; ``bicubic`` uses that filter. Default: no; for Hugging Face yes.
     layout: Order of the input's dimensions: N images, C channels, H rows, W columns.
     channels: Order of the input's channels, by default ``rgb``. ``grey``: a single channel.
-    scale: First factor of a grey level 0..255. Default: 1/255, or 1 if the network takes integers.
-    mean: Number to subtract then: one for each channel in the order of ``channels``, or one for
-        all. Default: 0.
+    scale: Factor of the grey levels 0..255. Default: 1/255, or 1 if the network takes integers.
+    mean: Number to subtract after that: one for each channel in the order of ``channels``, or one
+        for all. Default: 0.
     deviation: Divisor of the difference: one for each channel in the order of ``channels``, or one
         for all. Default: 1.
     outputs: Names of the outputs that show road. A pixel is road if one of them calls it road.
     road: Numbers of the classes that are road, from 0.
     activation: Way to make probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of
-        each, or ``none`` if it holds probabilities, which is the default if test images give only
-        numbers from 0 to 1. ``classes``: it holds numbers of classes, which is the default for
-        integers.
+        each, or ``none`` if it holds probabilities, the default if test images give only numbers
+        from 0 to 1. ``classes``: it holds numbers of classes, the default for integers.
     decide: Rule for road: a class of ``road`` beats all others (``argmax``), or the probability of
         road is above ``threshold``.
-    threshold: Number from 0 to 1, by default 0.5; without ``decide`` it means ``decide =
-        "threshold"``. With ``argmax`` it is the least share of road's best class in the best two.
+    threshold: Number from 0 to 1, by default 0.5; if it is set, ``decide`` is ``threshold`` by
+        default. With ``argmax`` it is the least share of road's best class in the best two.
     seconds: Longest time for an image, in seconds. A network that takes longer fails.
     megabytes: Greatest memory of the input or an output, in MiB. All arrays of an image together
         may take eight times that.

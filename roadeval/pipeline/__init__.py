@@ -1,1 +1,1 @@
-"""Stages and chains: pure functions on arrays, of the paper in `paper`, all others in `beyond`."""
+"""Stages and chains: pure functions on arrays. The paper's are in `paper`, others in `beyond`."""

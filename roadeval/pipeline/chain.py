@@ -1,4 +1,4 @@
-"""A pipeline: stages by name with their settings; and the chain that it becomes to run."""
+"""A pipeline, its stages and their settings; and a chain, the pipeline ready to run."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Pipeline:
     def heard_stages(self) -> tuple[Stage, ...]:
         """Return the stages whose masks a later stage learns from."""
         pairs = self._pairs()
-        hearing = [n for n, (stage, own) in enumerate(pairs) if stage.hears and stage.hears(own)]
+        hearing = [place for place, (s, values) in enumerate(pairs) if s.hears and s.hears(values)]
         return tuple(stage for stage, _ in pairs[: max(hearing, default=0)] if stage.yields_mask)
 
     def resolved(self) -> Pipeline:
@@ -128,11 +128,11 @@ class Chain:
     def run(
         self, view: View, shared: dict[Any, StageResult] | None = None
     ) -> Iterator[StageResult]:
-        """Yield the output of each stage, and how long it took; ``view`` is the first stage's.
+        """Yield the output and the seconds of each stage; ``view`` is the input of the first one.
 
-        A stage runs when its result is taken. ``shared`` holds results that the chains of a frame
-        share: those of a first stage that makes a mask and learns nothing, as a network that is one
-        variant and is tuned in another. It runs once.
+        A stage runs when its result is taken. ``shared`` holds the results that the chains of a
+        frame share: a first stage that makes a mask and learns nothing runs only once, such as a
+        network that is one variant and is tuned in another.
         """
         shared, seen = {} if shared is None else shared, view
         for step in self.steps:

@@ -83,9 +83,9 @@ def table_of(margins: Margins, decide: Decide) -> Words:
     """Return which colours have a positive margin, for `roadeval.kernels.plain.look_up_colours`.
 
     Each decision is exactly that of ``decide``, which takes colours, ``(n, 3)`` uint8, and returns
-    ``(n,)`` bool: a margin decides if it is further from 0 than its error bound, and ``decide`` the
-    other colours, as a rule some twenty. If there are more than `FEW`, as for a machine that has
-    learnt nothing and whose margin is 0 everywhere, none of them has a positive margin.
+    ``(n,)`` bool: a margin decides if it is further from 0 than its error bound, else ``decide``
+    does, usually for some twenty colours. If there are more than `FEW` of these, as with a margin
+    of 0 everywhere if nothing was learnt, none of them counts as positive.
 
     A word holds a cube of 4x4x4 colours, so a block of four red levels fills 64 x 64 words::
 

@@ -1,4 +1,4 @@
-"""The working image, on which texture means the same for every camera, and conversions to and fro.
+"""The working image, on which texture means the same for every camera, and its conversions.
 
 A `Scene` holds the arrays that all features of a frame share. A classifier of colours learns the
 exposure and the camera along with the road. The reference patch, which is road in nearly every
@@ -42,7 +42,7 @@ SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}
 """Weights of squared barriers in the costs of further paths. These go a long way over faint edges
 before they cross a steep one: around the end of a kerb, not over it."""
 ROUNDS: Final = 3
-"""Sweeps up and down. More would shorten the path to about one pixel in a hundred by 1 %."""
+"""Sweeps up and down. More would shorten the paths to about 1 % of the pixels by 1 %."""
 SCALE: Final = 10_000
 """Scale of costs as whole numbers: the least has two digits."""
 FLOOR: Final = 0.005

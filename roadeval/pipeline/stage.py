@@ -46,6 +46,11 @@ def stage_settings(cls: type[T]) -> type[T]:
     return cast("type[T]", validated(cls, frozen=True, config=ConfigDict(extra="forbid")))
 
 
+@stage_settings
+class NoSettings:
+    """The stage has no settings."""
+
+
 class MisfitError(RoadevalError, ValueError):
     """Parameters that do not fit a stage's settings: which, and what to do."""
 
@@ -55,7 +60,7 @@ class StageError(RoadevalError):
 
 
 class AbsentError(StageError):
-    """A frame without another method's mask: only the variant that needs it leaves it out."""
+    """A frame without another method's mask: only the variant that needs the mask skips it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +140,8 @@ class Stage:
     preprocesses: bool = False
     """Whether it only changes the image, in every variant."""
     oracle: Callable[[Any, Any, View, Truth], Output] | None = None
-    """``oracle(settings, parameters, view, truth)`` is the perfect stage: it knows the truth, of
-    shadow for a filter, else of the road. None if a perfect one is of no interest."""
+    """``oracle(settings, parameters, view, truth)`` returns the output of a perfect stage, made
+    from the truth of shadow for a filter, else from that of the road. None if there is none."""
     inference_only: tuple[str, ...] = ()
     """Settings that the learnt parameters do not depend on: a model may be used with other values
     than those it was trained with."""

@@ -10,7 +10,7 @@ import inspect
 import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import is_dataclass, replace
 from functools import cache
 from importlib import import_module
 from operator import attrgetter
@@ -22,7 +22,7 @@ import numpy as np
 from roadeval.data import CERTAIN, Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
-from roadeval.pipeline.stage import Output, Stage, StageError, View, per_view
+from roadeval.pipeline.stage import NoSettings, Output, Stage, StageError, View, per_view
 from roadeval.runtime.discovery import by_name, collect, one_line, points_of
 from roadeval.runtime.files import sha256_of
 
@@ -102,12 +102,7 @@ def check_stage(stage: Stage) -> None:
     if stage.name in STAGES:
         raise ValueError(f"its name {stage.name!r} is that of a stage of roadeval")
     if stage.fit is not None and stage.parameters is None:
-        raise ValueError("it learns, and does not name the type of its parameters")
-
-
-@dataclass(frozen=True)
-class NoSettings:
-    """Settings of a function that has none."""
+        raise ValueError("it learns, but does not name the type of its parameters")
 
 
 def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
@@ -138,9 +133,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
         array = np.asarray(function(**{key: values[key] for key in values if key in arguments}))
         codes = None
         if array.ndim != 2:
-            raise ValueError(
-                f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask"
-            )
+            raise ValueError(f"it returned {array.dtype} {array.shape}, not an (H, W) mask")
         if array.dtype.kind == "f":
             if not ((array >= 0) & (array <= 1)).all():
                 raise ValueError("it returned floats that are no probabilities, from 0 to 1")
@@ -153,7 +146,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
 
 
 def guard(stage: Stage) -> Stage:
-    """Return a stage whose errors are `StageError`, and which raises one for a wrong output."""
+    """Return a stage whose errors are `StageError`; a wrong output is such an error, too."""
 
     def name_errors(problem: str, work: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that does the same work, and names the stage in errors."""
@@ -181,7 +174,10 @@ def guard(stage: Stage) -> Stage:
         return name_errors("failed", run_checked)
 
     fit = stage.fit and name_errors("cannot learn", stage.fit)
-    return replace(stage, bind=name_errors("cannot be made ready", bind), fit=fit)
+    adapt = stage.adapt and name_errors("cannot learn further", stage.adapt)
+    oracle = stage.oracle and name_errors("failed with the truth", stage.oracle)
+    bind = name_errors("cannot be made ready", bind)
+    return replace(stage, bind=bind, fit=fit, adapt=adapt, oracle=oracle)
 
 
 def _place(error: Exception) -> str:
@@ -206,14 +202,14 @@ KINDS: Final[Mapping[LayerKind, ArrayKind]] = {
 def check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
     """Raise an error if this is no output, or one of its arrays has a wrong size or type."""
     if not isinstance(output, Output):
-        raise TypeError(f"it returned {type(output).__name__} and no Output")
+        raise TypeError(f"it returned {type(output).__name__}, not Output")
     size = view.image.shape[:2]
     if stage.yields_mask and not isinstance(output.mask, Packed):
-        raise TypeError("it handed out no mask (Packed.of makes one)")
+        raise TypeError("it returned no mask (Packed.of makes one)")
     if output.mask is not None and output.mask.shape != size:
         raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
     if wrong := [layer.spec.name for layer in output.layers if layer.spec not in specs]:
-        raise ValueError(f"it handed out a layer {wrong[0]!r} that it does not announce")
+        raise ValueError(f"it returned a layer {wrong[0]!r} that its stage does not list")
     arrays: list[tuple[str, Any, ArrayKind]] = [
         ("image", output.image, KINDS[LayerKind.RGB]),
         ("probability", output.probability, (2, (np.uint16,))),
@@ -225,6 +221,5 @@ def check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpe
         shape = view.image.shape[:dimensions]
         if array.shape != shape or not any(np.issubdtype(array.dtype, kind) for kind in types):
             kinds = " or ".join(kind.__name__ for kind in types)
-            raise ValueError(
-                f"its {name} is {array.dtype} {array.shape}: it must be {kinds} {shape}"
-            )
+            made = f"{array.dtype} {array.shape}"
+            raise ValueError(f"its {name} is {made}: it must be {kinds} {shape}")

@@ -12,14 +12,14 @@ scalar     grey PNG, coloured by the   the nearest of 256 levels over the range,
 rgb        PNG                         the same image; if not exact, a JPEG, reduced
 =========  ==========================  ============================================================
 
-A reduced image has the means of blocks of pixels, of two by two or of so many that at most
-`COLUMNS` columns are left: it is there to be looked at, and a map of 1920x1200 pixels takes twice
-the bytes of the camera's JPEG. An image is large if it has more than twice as many columns.
+A reduced image holds the means of blocks of pixels, two by two or larger, so that at most `COLUMNS`
+columns are left. It is only looked at: a full map of 1920x1200 pixels takes twice the bytes of the
+camera's JPEG. An image is large if it has more than twice as many columns.
 
-A map's JPEG rounds all frequencies to multiples of the same step: with the same mean error it takes
-three quarters of the bytes that the usual tables take, which are made for eyes, and which OpenCV
-cannot change. Multiples of 12 leave a mean error of at most 2.8 levels, even on pure noise. Blocks
-of one level, as both ends of the range are where values lie beyond it, come back the same.
+A map's JPEG rounds all frequencies to multiples of the same step, which OpenCV cannot set. With the
+same mean error it takes three quarters of the bytes of the usual tables, which are made for eyes.
+Multiples of 12 leave a mean error of at most 2.8 levels, even on pure noise. Blocks of one level,
+such as areas beyond an end of the range, come back unchanged.
 
 Only ``columns`` imports Rerun: decoding does not need it.
 
@@ -61,7 +61,7 @@ JPEG_QUALITY: Final = 90
 REDUCED_QUALITY: Final = 80
 """Quality of colour images that need not be exact, which are also reduced."""
 STEPS: Final = [8] + [12] * 63
-"""Steps of the 8x8 frequencies of a map's JPEG; one of the first, for the mean, is one level."""
+"""Steps of the 8x8 frequencies of a map's JPEG; the first, 8, is one level of a block's mean."""
 
 COLUMNS: Final = 400
 """Greatest number of columns of a reduced image."""
@@ -111,7 +111,7 @@ class Codec:
         return _jpeg(array, JPEG_QUALITY)
 
     def fitted(self, array: Any) -> Array:
-        """Return an array of a frame of another size in the recording's size."""
+        """Return the array of a frame of another size, resized to the recording's size."""
         pixels = array.pixels() if isinstance(array, Packed) else array
         method = cv2.INTER_LINEAR if pixels.ndim == 3 else cv2.INTER_NEAREST
         return np.asarray(cv2.resize(pixels, (self.width, self.height), interpolation=method))
@@ -232,8 +232,8 @@ _GREY, _COLOUR, _PALETTE = 0, 2, 3
 """The kinds of pixels in a file's header."""
 
 _WINDOW_BITS: Final = 9
-"""Base-2 logarithm of the bytes in which repetitions are looked for: on masks and on noise, the
-distance of one further back costs more bits than it saves."""
+"""Base-2 logarithm of the bytes that are searched for repetitions: on masks and on noise, a
+reference further back costs more bits than it saves."""
 
 
 def encode_labels(labels: Bytes | Packed, palette: Sequence[ColourWithOpacity]) -> bytes:

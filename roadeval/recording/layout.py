@@ -84,11 +84,11 @@ class RecordingError(RoadevalError):
 
 
 class SeveralCamerasError(RecordingError):
-    """No camera was named of a recording of several."""
+    """A recording has several cameras, and none of them was named."""
 
     def __init__(self, path: object, cameras: Sequence[str]) -> None:
-        names = ", ".join(cameras)
-        super().__init__(f"{path}: a recording of several cameras; name one of {names}")
+        remedy = f"name one of {', '.join(cameras)}"
+        super().__init__("a recording of several cameras", where=path, remedy=remedy)
         self.cameras = cameras
 
 
@@ -96,10 +96,9 @@ class DamagedError(RecordingError):
     """A part of a recording differs from what was written."""
 
     def __init__(self, path: object, part: str) -> None:
-        super().__init__(
-            f"{path}: the recording is damaged inside, at {part}; make it again, or read the "
-            "results folder of its run"
-        )
+        problem = f"the recording is damaged inside, at {part}"
+        remedy = "make it again, or read the results folder of its run"
+        super().__init__(problem, where=path, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -148,8 +147,8 @@ class Layout:
         for variant in self.variants:
             if variant.name in RESERVED or not is_plain(variant.name):
                 raise RecordingError(
-                    f"a variant cannot be named {variant.name!r}: the recording uses that name "
-                    "itself, or no path in it can hold it; choose another"
+                    f"a variant cannot be named {variant.name!r}: the recording uses this name, or "
+                    "its characters cannot stand in a path; choose another"
                 )
 
     @property
@@ -175,7 +174,7 @@ class Layout:
                     yield f"{DISTURBED}/{name}/{variant.name}/{spec.name}", spec
 
     def plan(self) -> Plan | None:
-        """Return how the ground is seen from above; None where it is unknown."""
+        """Return the view of the ground from above; None if the ground is unknown."""
         return Plan(self.ground, *self.extent, CELL) if self.ground else None
 
     def from_above(self) -> Iterator[tuple[str, LayerSpec]]:
@@ -231,7 +230,7 @@ _RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")
 
 @dataclass(frozen=True)
 class RecordRule:
-    """The setting ``output.record``. It concerns images: all else is recorded of every frame.
+    """The setting ``output.record``: which frames have images; the rest is always recorded.
 
     >>> RecordRule.parse("worst:20")
     RecordRule(kind='worst', number=20)

@@ -164,9 +164,9 @@ def worst_error(result: FrameResult, layout: Layout) -> float:
 
 
 class WorstFrames:
-    """Encoded images of the frames with the highest ERR: at most ``most``, in `HELD` bytes.
+    """Encoded images of the frames with the highest ERR: at most ``most`` frames, `HELD` bytes.
 
-    They wait here until the last frame is known.
+    They wait here until the last frame is encoded.
     """
 
     def __init__(self, most: int) -> None:
@@ -208,8 +208,8 @@ UNWRITTEN: Final = 4 << 20
 limit."""
 
 LEAST_FREE: Final = 64 << 20
-"""Bytes that must stay free on the disk beside the rows that wait. They are checked before each
-chunk but the last: they are meant for it, so that the partial recording ends complete."""
+"""Bytes that must stay free on the disk beside the rows that wait. Each chunk is written only if
+they are free, except the last, which may use them: so a partial recording ends complete."""
 
 HELD: Final = 256 << 20
 """Greatest number of bytes of images of the worst frames that wait until the end."""
@@ -505,7 +505,7 @@ class Recorder:
         self._watch(self._open_stream().flush)
 
     def _watch(self, call: Callable[[], object]) -> None:
-        """Make a call that waits for Rerun's writer, which ends if the file cannot grow.
+        """Make a call that waits for Rerun's writer; a `RecordingError` if the file cannot grow.
 
         Rerun would then wait forever, in such a call and when the process ends.
         """
@@ -517,7 +517,8 @@ class Recorder:
                 break
         if not answer.done() or answer.exception():
             atexit.unregister(rr.rerun_shutdown)
-            in_thread(partial(_keep, self._stream))
+            # Freeing the stream would wait for its writer, so a thread keeps it to the end.
+            in_thread(partial(lambda _stream: Event().wait(), self._stream))
             self._failed, self._stream = True, None
             raise self._incomplete()
 
@@ -525,7 +526,7 @@ class Recorder:
         return self.partial.stat().st_size if self.partial.exists() else 0
 
     def _refusal(self) -> OSError | None:
-        """Return the error that writing one more byte gives, as at a full quota; None if none."""
+        """Return the error of writing one more byte, such as a full quota; None if it works."""
         if self._room() < self._rows.size:
             return _failure(errno.ENOSPC)
         with suppress(ImportError):  # only POSIX has such a limit
@@ -563,11 +564,6 @@ class Recorder:
         return error
 
 
-def _keep(_stream: object) -> None:
-    """Keep a stream as long as the process lives: to free it would wait for its writer."""
-    Event().wait()
-
-
 def _failure(number: int) -> OSError:
-    """Return the error that Rerun met, or would meet, and does not report."""
+    """Return the error of the system that Rerun does not report."""
     return OSError(number, os.strerror(number))

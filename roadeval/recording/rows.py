@@ -38,7 +38,7 @@ CHUNK_BYTES: Final = 1 << 19
 is held in memory several times while it is packed and written."""
 
 SHARE: Final = 8
-"""The frames so far that it takes for another frame to wait, within `WaitLimits`."""
+"""The rows of at most one in so many recorded frames wait, within `WaitLimits`."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class WaitLimits:
     most: int
 
     def after(self, frames: int) -> int:
-        """Return for how many frames rows wait when the recording has ``frames``."""
+        """Return the number of frames whose rows may wait when the recording has ``frames``."""
         return min(max(frames // SHARE, self.least), self.most)
 
 
@@ -91,7 +91,7 @@ class PendingRows:
 
 
 class Batcher(dict[Key, PendingRows]):
-    """Rows of entities with the same `WaitLimits`: due together, or those of one when full."""
+    """Waiting rows of entities with the same `WaitLimits`, sent together; a full chunk earlier."""
 
     def __init__(self, limits: WaitLimits, header_time: str = HEADER_TIME) -> None:
         super().__init__()

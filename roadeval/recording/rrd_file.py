@@ -1,17 +1,17 @@
-"""A recording's file: the rows of its entities, also of a killed run as far as they were written.
+"""A recording's file, read by rows of its entities; a killed run's as far as it was written.
 
 A Rerun file is a sequence of messages, each with a header; the index is the last one::
 
     RRF2  [header|message] [header|message] ...  [header|index] [where the index lies]
 
-A message holds rows of one entity, and is read by its place alone.
+A message holds rows of one entity, and can be read without the others. No other module knows the
+bytes of the format.
 
-This module is a fence: nothing else knows the bytes of the format. Rerun's public reader,
-`rerun.chunk.RrdReader`, gives the same rows of a sound file (``tests/recording/test_rrd_file``).
-But it ended the process on two of 320 files with a few bytes changed at random, and stopped at the
-damage in nearly all others; here every sound frame is read, and the rest is one line
-(``tests/recording/test_damage``). To read a table takes half the CPU time here, 0.27 s instead of
-0.55 s, because Rerun is not imported.
+Rerun's public reader, `rerun.chunk.RrdReader`, gives the same rows of an undamaged file
+(``tests/recording/test_rrd_file``). But it crashed on two of 320 files with a few bytes changed at
+random, and stopped at the damage in nearly all others; here every undamaged frame is read, and the
+damage is one line (``tests/recording/test_damage``). Reading a table takes half the CPU time here,
+0.27 s instead of 0.55 s, because Rerun is not imported.
 """
 
 from __future__ import annotations

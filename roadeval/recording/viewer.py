@@ -43,10 +43,8 @@ def show(recording: Path, frame: int | None = None) -> None:
     screen, or the viewer does not start.
     """
     if not has_screen():
-        raise RecordingError(
-            f"No screen to open a window on: open {recording} on a machine that has one, or "
-            "take a screenshot."
-        )
+        remedy = "open it on a machine with a screen, or take a screenshot"
+        raise RecordingError("no screen to show it on", where=recording, remedy=remedy)
     with open_viewer(recording) as (process, client):
         go_to(client, frame)
         process.wait()
@@ -69,10 +67,8 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
     if "VK_ICD_FILENAMES" not in os.environ and os.name == "posix":
         # The software driver draws the same everywhere.
         if not (drivers := sorted(DRIVERS.glob("lvp_icd*.json"))):
-            raise RecordingError(
-                "no graphics driver that draws without a screen; on Debian or Ubuntu: "
-                f"apt-get install {PACKAGE}"
-            )
+            remedy = f"on Debian or Ubuntu: apt-get install {PACKAGE}"
+            raise RecordingError("no graphics driver that draws without a screen", remedy=remedy)
         driver["VK_ICD_FILENAMES"] = str(drivers[0])
     # The viewer reads a user's own settings from these folders; a screenshot has none.
     with tempfile.TemporaryDirectory() as home:

@@ -1,1 +1,1 @@
-"""The machine: threads, files, memory, text from elsewhere. Knows nothing of the domain."""
+"""Threads, files, memory and text from outside. This room knows nothing of roads and cameras."""

@@ -1,7 +1,7 @@
 """Definitions collected from the modules of a folder, and from other installed packages.
 
 One file of a folder adds one thing. A package adds the same by an entry point of the group
-``roadeval.KIND``: it is one thing of that kind, or a list of them.
+``roadeval.KIND``, which leads to one thing of that kind or to a list of them.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def versions_of(packages: Iterable[str]) -> dict[str, str]:
 
 
 def failed_package(error: BaseException) -> str:
-    """Return the package with entry points that an error comes from; nothing if it is none."""
+    """Return the name of the added package in which an error arose; empty if there is none."""
     modules = {frame.f_globals.get("__name__") for frame, _ in walk_tb(error.__traceback__)}
     points = (point for kind in KINDS for point in points_of(kind))
     return next((package_of(point) for point in points if point.module in modules), "")

@@ -1,7 +1,7 @@
 """JSON, TOML, YAML and Protocol Buffers from elsewhere, read within limits.
 
-A few kilobytes can nest too deep for any program, hold a name of twenty thousand words, or a word
-that takes minutes to typeset.
+A few kilobytes can hold lists that nest too deep for any program, a name of twenty thousand words,
+or a word that takes minutes to typeset.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def read_json(
 ) -> Any:
     """Read a JSON document; a ValueError if it is damaged or beyond a limit.
 
-    The lengths of texts have a limit only if they may be ``shown``.
+    The limits on the lengths of texts apply only if the texts may be ``shown``.
     """
     _check_size(len(content), most)
     marks = ",[{" if isinstance(content, str) else (b",", b"[", b"{")

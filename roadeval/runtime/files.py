@@ -1,8 +1,8 @@
 """Files and folders that are replaced as one, by one run at a time.
 
-Each is written under a name of its own and takes its place when it is complete, so that a file with
-an output's name is complete. A run claims its outputs before it computes, and removes what killed
-runs have left of them.
+An output is written under a temporary name and renamed when it is complete, so that a file with the
+final name is never partial. A run claims its outputs before it computes, and removes the partial
+files of killed runs.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Paths = AnyPath | Sequence[AnyPath]
 """One path, or some."""
 
 _MOVING: Final = "-moving"
-"""End of a complete folder's name while its files are moved into the folder that it replaces."""
+"""Suffix of a complete folder's name while its files are moved into the target folder."""
 _REPLACED: Final = ".replaced"
-"""Name of the old folder's seal in such a folder."""
+"""Name under which that folder keeps the old result's seal until the old files are removed."""
 _PATIENCE_S: Final = 0.2
 """Time between two attempts to claim an output."""
 
@@ -52,7 +52,7 @@ def list_paths(paths: Paths) -> list[AnyPath]:
 
 @contextmanager
 def reading(place: object, kind: Callable[..., Exception], problem: str = "") -> Iterator[None]:
-    """Turn an OSError inside the block into an error of a room, which ``kind`` makes."""
+    """Turn an OSError inside the block into the error that ``kind`` makes."""
     try:
         yield
     except OSError as error:
@@ -61,12 +61,12 @@ def reading(place: object, kind: Callable[..., Exception], problem: str = "") ->
 
 
 def writing(place: object, kind: Callable[..., Exception]) -> AbstractContextManager[None]:
-    """Turn an OSError inside the block into an error of a room: it cannot be written."""
+    """Turn an OSError inside the block into an error that says that ``place`` cannot be written."""
     return reading(place, kind, "cannot be written")
 
 
 def check_input(path: str | Path) -> None:
-    """Raise an OSError if a path does not lead to a file that can be read from begin to end.
+    """Raise an OSError if a path does not lead to a file that can be read to its end.
 
     A pipe may never give a byte, a device may never end, and a pointer of Git LFS stands for a file
     that is elsewhere.
@@ -107,7 +107,7 @@ def partial_name(path: Path, *, hidden: bool = True) -> Path:
 def find_partial(path: Path, *, hidden: bool = True) -> list[Path]:
     """List the files and folders with a `partial_name` of an output, the newest last.
 
-    A name may end in a hyphen and a word.
+    A hyphen and a word, such as ``-moving``, may follow the name.
     """
     dot, stem, suffix = r"\." if hidden else "", re.escape(path.stem), re.escape(path.suffix)
     pattern = re.compile(rf"{dot}{stem}\.[0-9a-f]{{8}}\.partial{suffix}(-\w+)?")
@@ -152,7 +152,7 @@ class NewFile:
         self.partial: Final = partial_name(self._target, hidden=hidden)
 
     def begin(self) -> None:
-        """Make its folder; an OSError if that fails, or no file can have its name."""
+        """Make its folder; an OSError if that fails, or if no file can have this name."""
         check_output(self._target)
         self._target.parent.mkdir(parents=True, exist_ok=True)
 
@@ -189,9 +189,9 @@ class Content:
 class NewFolder:
     """A folder that is written as ``partial``, and whose files take their places together.
 
-    It is written inside the folder with its name. Then the old seal is removed first, and the new
-    one moved last; `claim_folder` completes the moves of a killed run. If ``path`` is a link, the
-    folder behind it is written; ``content`` lists the files that are replaced.
+    It is written inside the target folder. `publish` removes the old seal first and moves the new
+    one last; `claim_folder` completes the moves of a killed run. If ``path`` is a link, its target
+    is written; ``content`` lists the files that are replaced.
     """
 
     def __init__(self, path: Path, content: Content) -> None:
@@ -202,12 +202,12 @@ class NewFolder:
         self.partial: Final = partial_name(self._target / self._target.name)
 
     def begin(self) -> None:
-        """Make it, empty; an OSError if that fails, or no folder can have its name."""
+        """Make the empty folder; an OSError if that fails, or if no folder can have this name."""
         check_output(self.path, folder=True)
         self.partial.mkdir(parents=True)
 
     def publish(self) -> None:
-        """Let its files take their places.
+        """Move the files to their places.
 
         After an OSError the old content is there, or the next `claim_folder` completes the new.
         """
@@ -225,10 +225,10 @@ class NewFolder:
 
 
 def _settle(moving: Path, content: Content) -> None:
-    """Move the files of a complete folder into its parent; after a kill, the remaining ones."""
+    """Move the files of a complete folder, or those that a killed run left, into its parent."""
     target, seal, replaced = moving.parent, moving / content.seal, moving / _REPLACED
     if seal.exists():
-        with suppress(FileNotFoundError):  # without an old seal no file there is this output's
+        with suppress(FileNotFoundError):  # without an old seal, no file belongs to an old result
             (target / content.seal).replace(replaced)
         if replaced.exists():
             for name in content.names(replaced):

@@ -12,8 +12,7 @@ from typing import Final
 from roadeval.runtime.sentence import Sentence
 
 LACKING: Final = Sentence(
-    "not enough memory: give it more, or let it take less, by fewer {run.jobs} or a "
-    "smaller {frames.scale}"
+    "not enough memory: take fewer {run.jobs}, a smaller {frames.scale}, or a larger machine"
 )
 _LACKING: Final = re.compile(
     "(allocat|map segment|new thread|create thread|Insufficient memory|out of memory|bad_alloc)",
@@ -31,8 +30,8 @@ TRIM_EVERY: Final = 256
 def trim() -> None:
     """Return freed memory to the system: between the phases of a run, and every `TRIM_EVERY` items.
 
-    The memory that training frees is an eighth of a run's peak. Freed memory between arrays that
-    stay grows for hours: by 100 MiB in 16,000 images of 1280x720. Only glibc needs this call.
+    Training frees an eighth of a run's peak. Without this call the gaps between live arrays grow
+    for hours: by 100 MiB in 16,000 images of 1280x720. Only glibc needs it.
     """
     if sys.platform == "linux":
         malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -41,10 +40,10 @@ def trim() -> None:
 
 
 def reuse() -> None:
-    """Keep the memory that a frame has freed for the next one, of arrays up to `LARGEST` bytes.
+    """Keep the memory of a frame's freed arrays, up to `LARGEST` bytes each, for the next frame.
 
-    By default glibc returns it at once, and the system clears each page that it gives out again: a
-    tenth of a replay's CPU time. `trim` returns the rest.
+    By default glibc returns it at once, and the system clears each page before it gives it out
+    again, which takes a tenth of a replay's CPU time. `trim` returns the kept memory.
     """
     if sys.platform == "linux" and (mallopt := getattr(ctypes.CDLL(None), "mallopt", None)):
         for parameter in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):

@@ -11,7 +11,7 @@ _ASK: Final = "git -c core.fsmonitor=false status --porcelain=v2 -b -uno --ignor
 
 
 def current_commit(patience_s: float = 3.0) -> tuple[str, bool]:
-    """Return git's commit, and whether tracked files differ; empty if git does not answer."""
+    """Return the current commit, empty if git does not answer, and whether tracked files differ."""
     quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0", "GIT_NO_LAZY_FETCH": "1"}
     how: Any = {"stdin": subprocess.DEVNULL, "capture_output": True, "env": quiet}
     try:

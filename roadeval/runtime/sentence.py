@@ -1,4 +1,4 @@
-"""Sentences for people, which know the settings that they name."""
+"""Sentences in which names of settings are marked, so that each interface can use its own names."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class Setting(str):
 
 
 class Sentence(str):
-    """Text that knows which of its parts are settings.
+    """Text in which the names of settings are marked.
 
-    As a string it names a setting as Python does, between backticks; `name_settings` gives it the
-    names of another place.
+    As a string it shows a setting's Python name between backticks; `name_settings` replaces these
+    names, for example by flags.
 
     >>> sentence = Sentence("{} frames are too many; lower {training.frames}", 90)
     >>> print(sentence)
@@ -48,10 +48,10 @@ class Sentence(str):
     @classmethod
     def of(cls, parts: Iterable[str]) -> Sentence:
         """Return the sentence that consists of these texts and settings."""
-        known = tuple(filter(None, parts))
-        texts = (f"`{part}`" if isinstance(part, Setting) else part for part in known)
+        nonempty = tuple(filter(None, parts))
+        texts = (f"`{part}`" if isinstance(part, Setting) else part for part in nonempty)
         self = super().__new__(cls, "".join(texts))
-        self.parts = known
+        self.parts = nonempty
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""Text from elsewhere, as names of topics and files, made safe to show.
+"""Text from outside, such as names of topics and files, made safe to show.
 
 A name can hold a terminal's command, a mark that turns the direction of the text around it, or a
 line break that begins a false message. All text for people passes through `visible`.
@@ -20,10 +20,10 @@ _MARKUP: Final = frozenset("\\`*_[]<>|#&~$@")
 _URL: Final = re.compile(
     r"((?:[A-Za-z][A-Za-z0-9+.-]+:/(?:/|(?=[^\s/@]*@))|(?:https?|gs|s3):/))(\S*)"
 )
-"""A URL in a text; also one that passed for a path and lost a slash."""
+"""A URL in a text, also one from which a `Path` has removed a slash."""
 
 LIKENESS: Final = 0.7
-"""How alike a mistyped name and the one that was meant are at least, as `difflib` counts."""
+"""Least similarity, as `difflib` counts it, of a mistyped name and the name that is suggested."""
 UNENCODABLE: Final = "roadeval.visible"
 """Name of an error handler for streams: it escapes letters that the encoding lacks."""
 
@@ -113,7 +113,7 @@ def _public(rest: str) -> str:
     """Return the part of a URL after its scheme without user, password, query and fragment."""
     host = re.split("[/?#]", rest, maxsplit=1)[0]
     if "@" not in host and re.search(r"^[^\[]*:(?!\d*\W*$)", host):
-        # This is no port, but a password with one of those letters in it, or its beginning.
+        # No port follows the colon, but a password that contains /, ? or #, or begins with it.
         return _public(rest.rpartition("@")[2]) if "@" in rest else ""
     return re.split("[?#]", host.rpartition("@")[2] + rest[len(host) :], maxsplit=1)[0]
 
@@ -137,7 +137,7 @@ def _escape(letters: str) -> str:
 
 
 def escape_unencodable(error: UnicodeError) -> tuple[str, int]:
-    """Return the escaped letters of an error of encoding, and the place after them."""
+    """Return the letters that cannot be encoded, escaped, and the place after them."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return _escape(error.object[error.start : error.end]), error.end

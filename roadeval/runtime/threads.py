@@ -68,10 +68,10 @@ def in_thread(call: Callable[[], R]) -> Future[R]:
 def time_limit(
     end: Callable[[], None], seconds: float, grown: float = math.inf
 ) -> Iterator[threading.Event]:
-    """Call ``end`` if the work within takes longer than some seconds; then the event is set.
+    """Call ``end`` and set the yielded event if the block takes longer than ``seconds``.
 
     The same happens if the process grows by more than ``grown`` bytes. In a thread of `map_ordered`
-    a stop calls ``end`` as well, since no exception reaches the code of a library.
+    ``end`` is also called when the map stops early: no exception reaches the code of a library.
     """
     done, late = threading.Event(), threading.Event()
     stopped, until = getattr(_LOCAL, "stopped", done), time.monotonic() + seconds

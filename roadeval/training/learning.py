@@ -1,4 +1,4 @@
-"""How the model of a run is made: which frames train it, and how each variant is fitted to them."""
+"""The choice of a run's training frames, and the fit of each variant to them."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def fit(
     settings: TrainingSettings,
     base: Model | None = None,
 ) -> Model:
-    """Train every variant that learns on decoded frames; their truths make the baseline.
+    """Return a model of the variants that learn and of the baseline, from decoded frames.
 
     A `TrainingError` if some variant learns and there is no frame, or the frames show only road or
     no road at all. The frames have truth, unless ``settings.source`` allows the patch. ``base`` is
-    the model of other drives: stages that can learn further do so, the others stay unchanged.
+    a model of other drives: stages that can learn further do so, the others stay unchanged.
     """
     learning = [name for name, pipeline in pipelines.items() if pipeline.learning_stages()]
     if learning and not frames:
@@ -183,7 +183,7 @@ class Schedule:
     digests: frozenset[str] = frozenset()
     """Hashes of the frames that trained the model."""
     trained: frozenset[int] = frozenset()
-    """Numbers of those frames, if all of them are this run's."""
+    """Numbers of those frames, if this run's log has all of them."""
     gap: frozenset[int] = frozenset()
     """Numbers of the frames after them that are left out as well."""
     first: int | None = None
@@ -299,8 +299,8 @@ def require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_tr
             )
     if not by_truth and settings.source != "patch":
         raise TrainingError(
-            "no frame of the range has road truth to adapt the model to, and what the reference "
-            "patch guesses may make it worse",
+            "no frame of the range has road truth to adapt the model to, and guesses by the "
+            "reference patch may make it worse",
             remedy=Sentence('leave {training.adapt} out, or insist with training.source = "patch"'),
         )
 
@@ -308,11 +308,11 @@ def require_adaptable(pipelines: Pipelines, settings: TrainingSettings, *, by_tr
 def choose_frames(
     frames: Frames, settings: TrainingSettings, held: HeldFrames, *, with_truth: bool
 ) -> Schedule:
-    """Hold ``settings.frames`` frames, and return which others are left out because of them.
+    """Hold ``settings.frames`` training frames; return the schedule with the gap around them.
 
-    They are the first ones, and the gap lies after them; or they are spread at equal distances, and
-    a gap lies on both sides of each. With ``with_truth`` all of them are labelled, and one must be
-    left to evaluate; a `TrainingError` if none is.
+    They are the first frames, and the gap lies after them; or they are spread at equal distances,
+    and a gap lies on both sides of each. If ``with_truth``, all of them are labelled, and another
+    labelled frame must be left to evaluate; a `TrainingError` if none is.
     """
     numbers: list[int] = []
 
@@ -436,7 +436,7 @@ def decode_all(
 ) -> Iterator[Frame]:
     """Yield the frames that can be decoded; ``lost`` receives the others' errors by number.
 
-    Replaying them reports these errors.
+    The replay reports these errors again.
     """
     for frame in frames:
         try:

@@ -156,9 +156,8 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
         if isinstance(error, ValidationError):
             first = error.errors(include_url=False)[0]
             reason = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"
-        raise ModelError(
-            f"a damaged model file: {reason}", where=path, remedy="train it again"
-        ) from error
+        problem = f"a damaged model file: {reason}"
+        raise ModelError(problem, where=path, remedy="train it again") from error
 
 
 def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
@@ -169,7 +168,7 @@ def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
     with suppress(OSError):
         state = path.stat()
         return _load(path, stages, state.st_ino, state.st_size, state.st_mtime_ns)
-    return load_model(path)  # it raises the error
+    return load_model(path)  # this raises the error as a `ModelError`
 
 
 @lru_cache(maxsize=2)

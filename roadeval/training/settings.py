@@ -1,4 +1,4 @@
-"""Every choice of the training, with its reason."""
+"""Settings of the training."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ class TrainingSettings:
 
     model: A model made by 'roadeval train' from other drives. Default: the log itself trains one.
     adapt: Let the model learn further from the drive's first frames, which are then not evaluated.
-        The result is then not one on a drive that the model has not seen. The reference patch alone
-        is used only if ``source`` insists on it: it may make the model worse.
+        The result then says nothing about drives that the model has not seen. The reference patch
+        alone is used only if ``source`` is ``patch``: it may make the model worse.
     source: ``auto``: the log's truth if it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
     frames: Labelled frames to train on, which are never evaluated. All frames count for ``patch``.
         They stay in memory.
-    placement: The ``first`` labelled frames, or some ``spread`` along the drive. Frames at equal
-        distances show all its light and places: the result then holds for a drive with labels here
-        and there, not for frames after the labelled ones.
-    gap: Frames to leave out after the training frames, or on both sides. The neighbours of a
-        training frame look like it, and flatter the result. Default: 0; spread: a quarter of their
-        distance.
+    placement: The ``first`` labelled frames, or some ``spread`` along the drive at equal distances.
+        These show all its light and places: the result then holds for a drive with labels here and
+        there, not for frames after the labelled ones.
+    gap: Number of frames to leave out after the training frames, or on both sides if ``spread``.
+        Frames next to a training frame look like it, and make the result too good. Default: 0; if
+        ``spread``, a quarter of their distance.
     pixels_per_class: Road pixels, and non-road pixels, drawn from each training frame.
-    max_pixels: Upper bound for all frames and classes: the SVM's training time grows with its
-        square.
+    max_pixels: Greatest number of pixels of all frames and classes together: the SVM's training
+        time grows with its square.
     seed: Seed of the draw. Another seed draws other pixels, and gives other rates.
-    patch: Self-supervision: the trapezoid in front of the vehicle that is taken for road.
+    patch: Self-supervision: the trapezoid in front of the vehicle that counts as road.
     horizon: Self-supervision: pixels above this share of the height are not road.
     far: Self-supervision: pixels below the horizon and nearer to the patch than this are road, all
         others are not; see `roadeval.pipeline.scene.reach`. Most roads end at 1.

@@ -273,9 +273,7 @@ def test_wrong_usage_points_to_the_help(capsys):
     ]
 
 
-LITTLE = (
-    "not enough memory: give it more, or let it take less, by fewer --jobs or a smaller --scale"
-)
+LITTLE = "not enough memory: take fewer --jobs, a smaller --scale, or a larger machine"
 DRAFT = RoadevalError("lacks a size")
 DRAFT.draft = 'file = "n.onnx"\nsize = [?, ?]'
 

@@ -215,7 +215,11 @@ PLACED = {"height": 1.0, "pitch": 1.0, "fov": 60.0}
         (None, {"height": 1.4, "fov": 60.0}, "missing: its pitch"),
         (None, {"fov": 60.0}, "the camera's height above the ground, and its pitch"),
         (None, {"height": 1.4, "pitch": -40.0, "fov": 60.0}, "it looks up"),
-        (None, {"model": "mei", "distortion": (1.0,)} | PLACED, "not known: mei of 1 numbers"),
+        (
+            None,
+            {"model": "mei", "distortion": (1.0,)} | PLACED,
+            "unknown distortion model mei of 1 numbers",
+        ),
         (None, {"model": "radtan", "distortion": (0.1,) * 14} | PLACED, "radtan of 14 numbers"),
         (None, {"model": "double_sphere"} | PLACED, "double_sphere of 0 numbers"),
         (None, {"model": "fisheye", "distortion": (0.1,) * 5} | PLACED, "fisheye of 5 numbers"),

@@ -181,7 +181,7 @@ def test_masks_of_another_time_or_size_are_refused_unless_they_are_to_be_scaled(
         ),
         (
             {"path": "other.mcap:/seg", "images": "images"},
-            "`masks.net.images`: only labels with names can be paired so",
+            "`masks.net.images`: only labels in files can be paired by name",
         ),
     ],
 )

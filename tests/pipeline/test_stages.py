@@ -1,11 +1,23 @@
 """Stages from outside the package: imported by their names, and guarded in what they hand out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from roadeval.config.run import configure
 from roadeval.config.tables import ConfigError
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Moment, Output, Packed, mask_spec
+from roadeval.data import (
+    LabelClass,
+    Layer,
+    LayerKind,
+    LayerSpec,
+    Moment,
+    Output,
+    Packed,
+    mask_spec,
+    ones,
+)
 from roadeval.pipeline.stage import Stage, StageError, View
 from roadeval.pipeline.stages import UnknownStageError, guard, stages_of
 from tests.pipeline.images import noise
@@ -30,8 +42,8 @@ def test_a_function_is_a_stage(name):
 
 
 def test_a_functions_settings_are_those_of_its_default():
-    assert output_of("below").mask.area() == 6 * 6
-    assert output_of("below", top=0.5).mask.area() == 4 * 6
+    assert ones(output_of("below").mask.bits) == 6 * 6
+    assert ones(output_of("below", top=0.5).mask.bits) == 4 * 6
 
 
 def test_floats_are_probabilities():
@@ -41,7 +53,7 @@ def test_floats_are_probabilities():
 
 
 def test_a_function_can_ask_for_the_moment():
-    assert output_of("fails_on_13", Moment(12, 0)).mask.area() == 24
+    assert ones(output_of("fails_on_13", Moment(12, 0)).mask.bits) == 24
     with pytest.raises(StageError, match="stage fails_on_13 failed: ZeroDivisionError: no road"):
         output_of("fails_on_13", Moment(13, 0))
 
@@ -54,7 +66,10 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("wrong_size", r"its mask is \(2, 2\)"), ("LAYERS", "a layer 'level' that it does not")],
+    [
+        ("wrong_size", r"its mask is \(2, 2\)"),
+        ("LAYERS", "a layer 'level' that its stage does not"),
+    ],
 )
 def test_an_output_that_cannot_be_is_an_error(name, message):
     with pytest.raises(StageError, match=message):
@@ -129,6 +144,16 @@ def run(spec, array):
 
     stage = Stage("own", "Own", int, bind, (spec,))
     return guard(stage).bind(0, None)(View.of(BLACK))
+
+
+@pytest.mark.parametrize("hook", ["bind", "fit", "adapt", "oracle"])
+def test_an_error_of_any_function_of_a_stage_names_the_stage(hook):
+    def fail(*_):
+        raise KeyError("no road")
+
+    stage = replace(Stage("own", "Own", int, lambda *_: None, (SPEC,)), **{hook: fail})
+    with pytest.raises(StageError, match=r"stage own .*: KeyError: 'no road' \(test_stages.py:"):
+        getattr(guard(stage), hook)(None, None)
 
 
 @pytest.mark.parametrize("held", [bool, np.int64])

@@ -1,11 +1,11 @@
 """The MCAP container: records, chunks, damage and recovery.
 
 The record classes are those of the `mcap` library. The walk through a file is our own because no
-package salvages MCAP: the library stops at the first record that makes no sense, and cannot read a
-log whose recorder was killed, whose chunks are damaged, or whose summary is missing or wrong.
+package recovers damaged MCAP files: the library stops at the first invalid record, and cannot read
+a log after its recorder was killed, with damaged chunks, or with a missing or wrong summary.
 
-A sound log takes the same walk, because only a walk shows that a log is sound, and a second way to
-read would be more code. The library is faster with a log of images: it opens one of 8 MB 1 ms
+An undamaged log takes the same walk, because only a walk shows that it is undamaged, and a second
+reader would be more code. The library is faster with a log of images: it opens one of 8 MB 1 ms
 faster, and reads it in two thirds of the time. But it makes an object of each message: a log of
 200,000 messages takes 10 times as long to open, and 8 times as long to read.
 

@@ -50,7 +50,7 @@ class ChannelLog:
     blocks: list[tuple[int, Entries]] = field(default_factory=list)
     """Chunk numbers and entries in the order of the file; empty if the channel is not wanted."""
     times_of_chunk: npt.NDArray[np.int64] | None = None
-    """Log times in one chunk, ascending, if not all messages were placed."""
+    """Log times in one chunk, ascending, if the places of other messages were not read."""
 
     def add(self, chunk: int, entries: Entries) -> None:
         """Add the messages of a chunk."""
@@ -67,7 +67,7 @@ def containers_in(
 ) -> Iterator[Container]:
     """Open the log in a file, and the logs that follow it in the same file.
 
-    ``opened`` is the open file if it lies elsewhere. ``stamp_of`` is called only next to damage.
+    ``opened`` is the open file if it is remote. ``stamp_of`` is called only next to damage.
     """
     rest = FileBytes(opened or path.open("rb", buffering=BUFFER))
     while len(rest):
@@ -90,7 +90,7 @@ class Container:
         self.misled: set[int] = set()
         """Chunks with wrong message indexes."""
         self.redefined: dict[int, str] = {}
-        """Which of two descriptions of a topic is believed, by the offset of the second."""
+        """Which of two descriptions of a topic is used, in words, by the offset of the second."""
         logs = self._place_messages()
         counts = {channel_id: log.count for channel_id, log in logs.items()}
         if scan.summary.statistics and counts != {
@@ -110,12 +110,12 @@ class Container:
         self.logs = self._place_messages() if self._settle_descriptions(logs) else logs
         """The places of messages, by the number of their channel."""
         self.looked_into = frozenset(scan.seen)
-        """Chunks that were searched for messages, because they have no right message indexes."""
+        """Chunks that were searched for messages, because their message indexes are wrong."""
         scan.seen.clear()
 
     @property
     def expected(self) -> Mapping[int, int]:
-        """The number of messages of each channel, by the file's own statistics, if any."""
+        """The number of messages of each channel in the file's statistics; empty without these."""
         statistics = self.scan.summary.statistics
         return statistics.channel_message_counts if statistics else {}
 
@@ -157,7 +157,7 @@ class Container:
     def fingerprint(self) -> bytes:
         """Return sizes, places and checksums, which identify the log without its messages.
 
-        If a chunk has no checksum, its first bytes take part. A `BadRecord` if the disk fails.
+        A chunk without a checksum adds its first bytes. A `BadRecord` if the disk fails.
         """
         parts = [b"%d %d" % (len(self.source), self.scan.data_crc)]
         self.source.expect((c.data_offset, c.data_offset + 4096) for c in self.chunks if not c.crc)
@@ -183,7 +183,7 @@ class Container:
 
     @property
     def is_covered(self) -> bool:
-        """Whether all messages lie in chunks that have a checksum of their own."""
+        """Whether all messages lie in chunks with a checksum."""
         return not self.scan.loose and all(chunk.crc for chunk in self.chunks)
 
     def verify_data(self) -> None:
@@ -227,11 +227,11 @@ class Container:
         return channel is not None and (schema is not None or channel.schema_id == 0)
 
     def _settle_descriptions(self, logs: Mapping[int, ChannelLog]) -> bool:
-        """Settle topics with two descriptions; return whether a description changes or is new.
+        """Choose between two descriptions of a topic; return whether one changes or is new.
 
-        The messages of a topic decide. If they fit both descriptions, one from a chunk with a
-        checksum is believed: the data describes a topic in the first chunk, or in the chunk of the
-        topic's first message.
+        The topic's messages decide. If they fit both descriptions, one from a chunk with a checksum
+        is used: the data describes a topic in the first chunk, or in the chunk of the topic's first
+        message.
         """
         before = {*self.channels}, {*self.schemas}
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
@@ -257,7 +257,7 @@ class Container:
         return bool(self.redefined) or before != ({*self.channels}, {*self.schemas})
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
-        """Count messages of five chunks that a description decodes, and add up their delays."""
+        """Return how many messages in five chunks a description decodes, and minus their delays."""
         distances = []
         for channel_id, log in logs.items():
             channel, schema = self._described(channel_id)
@@ -274,7 +274,7 @@ class Container:
 
 @dataclass(frozen=True)
 class Damage:
-    """A damage of a file."""
+    """One damaged place of a file."""
 
     path: Path
     offset: int
@@ -290,7 +290,7 @@ class Damage:
     log_start_ns: int = 0
     """Log time from which the sentence counts seconds."""
     unsure_ns: int | None = None
-    """Log time from which messages may have other positions than at their recording."""
+    """Log time from which the positions of messages may differ from the recorded ones."""
 
     def __str__(self) -> str:
         start, end = (
@@ -328,17 +328,17 @@ def damage_of(container: Container) -> tuple[Damage, ...]:
 
 
 def sure_until(container: Container) -> int | None:
-    """Return the log time up to which messages have the positions of their recording.
+    """Return the log time up to which the positions of messages are those of the recording.
 
-    After a loss of an unknown number of messages they have other positions. None if all positions
-    are certain; damage that may lie anywhere gives a time before all others.
+    They shift after a loss of an unknown number of messages. None if all positions are certain; a
+    time before all others if the damage may lie anywhere.
     """
     doubts = (damage.unsure_ns for damage in damage_of(container))
     return min((time - 1 for time in doubts if time is not None), default=None)
 
 
 def _damaged_places(container: Container) -> Iterator[Damage]:
-    """Yield the bytes that make no sense, with the log times before and after each."""
+    """Yield the invalid parts of the file, with the log times before and after each."""
     scan = container.scan
     # If a chunk is cut off, the messages before the cut were saved.
     places = [

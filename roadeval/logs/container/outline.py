@@ -1,4 +1,4 @@
-"""A log by its summary and its first messages, which are cheap to read if it lies elsewhere."""
+"""A remote log described by its summary and first messages, which are cheap to read."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ COMPRESSED_BLOCK: Final = 128 << 10
 ENDS: Final = 4
 """Chunks whose indexes are read only for the times of first and last messages."""
 FEW: Final = 100
-"""Messages of which the first does not do, such as static transforms, that are read at most."""
+"""Greatest number of messages to read where one is not enough, such as static transforms."""
 
 
 class SummaryScan(Scan):
@@ -52,7 +52,7 @@ class SummaryScan(Scan):
         super().__init__(source, stamp_of)
 
     def _walk(self) -> None:
-        summary, self.summary = self.summary, Summary()  # nothing is held against what is read
+        summary, self.summary = self.summary, Summary()  # what is read is not compared with it
         counts, firsts, lasts = _ends_of_channels(summary)
         needed: dict[int, set[int]] = {}
         for number, chunk in firsts.items():
@@ -101,7 +101,7 @@ class SummaryScan(Scan):
     def _take_beginning(
         self, listed: Chunk, index: Mapping[int, Entries], channels: Set[int]
     ) -> None:
-        """Read a chunk as far as the first messages of some channels go; whole if that fails."""
+        """Read a chunk up to the first messages of some channels; the whole if that fails."""
         if not channels <= index.keys():
             raise BadRecord("a message index that the summary lists is not there")
         starts = np.sort(np.concatenate([entries[:, 1] for entries in index.values()]))
@@ -161,10 +161,10 @@ def _ends_of_channels(
 def outline_of(
     path: Path, file: IO[bytes], wanted: Wanted, several: Wanted, stamp_of: StampOf
 ) -> Container | None:
-    """Open a log by its summary; None if that is missing, damaged, or does not tell enough.
+    """Open a log by its summary; None if that is missing, damaged, or incomplete.
 
-    Of the ``wanted`` channels there are only the first messages, of those that need ``several`` all
-    that their first chunk holds. Damage elsewhere is not noticed.
+    The ``wanted`` channels have only their first messages, or as many as their first chunk holds if
+    they need ``several``. Damage of other parts is not noticed.
     """
     with suppress(BadRecord):
         outline = SummaryScan(FileBytes(file), stamp_of, wanted, several)

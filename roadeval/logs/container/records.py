@@ -63,7 +63,7 @@ IN_MEMORY: Final = 16 << 20
 CACHE: Final = 16 << 20
 """Bytes of uncompressed chunks in memory: topics that are read side by side share chunks."""
 DOUBTED: Final = 256 << 20
-"""Bytes that are tried in vain in an empty file; every byte of the file adds four."""
+"""Bytes that may be tried in vain in a search for records; every byte of the file adds four."""
 
 Buffer = bytes | memoryview
 Entries = npt.NDArray[np.int64]
@@ -71,7 +71,7 @@ Entries = npt.NDArray[np.int64]
 
 
 class FarFile:
-    """An open file that lies elsewhere, where several requests take no longer than one."""
+    """An open remote file, for which several requests take no longer than one."""
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
         """Begin to read the parts that are needed next, each from a byte up to another."""
@@ -176,7 +176,7 @@ class Chunk(NamedTuple):
     cut: bool = False
     """Whether it continues beyond the end of the file."""
     repaired: bool = False
-    """Whether its own head is damaged, and its content was found out otherwise."""
+    """Whether its head is damaged, and its length or kind follows from other bytes."""
 
     @property
     def data_end(self) -> int:
@@ -277,9 +277,9 @@ class ChunkReader:
         self.patience = DOUBTED + 4 * len(source)
         """Bytes that may still be uncompressed in vain; below 0 no chunk is proven."""
         self.bad: dict[int, str] = {}
-        """Why a chunk could not be read, by its offset."""
+        """Reasons why chunks could not be read, by their offsets."""
         self.flawed: dict[int, str] = {}
-        """The damage of chunks that were read in spite of it, by their offsets."""
+        """The damage of chunks that could still be read, by their offsets."""
 
     def read(self, chunk: Chunk) -> Bytes:
         """Read the records of a chunk, or those before the cut if it is cut off."""
@@ -300,10 +300,10 @@ class ChunkReader:
         return self._uncompress(chunk, LARGEST_CHUNK, whole=False)
 
     def proof(self, chunk: Chunk) -> Chunk | None:
-        """Return the chunk as proven if its content has its checksum, whatever its head claims.
+        """Return the chunk as proven if its content has its checksum, even if its head is wrong.
 
         Without a checksum it must consist of complete records, of the size that its head claims.
-        None if it does not, or if the file has claimed too many wrong chunks.
+        None if it is not proven, or if too many wrong chunks were tried.
         """
         left = len(self._source) - chunk.data_offset
         if (chunk.size or chunk.crc) and 0 < chunk.data_size <= left and self.patience >= 0:

@@ -1,8 +1,8 @@
 """The walk from record to record through a file, across damage.
 
-A record is taken if the next one is valid as well. Otherwise one of the two is damaged, or bytes
+A record is accepted if the next one is valid as well. Otherwise one of the two is damaged, or bytes
 are missing. The search for the next valid record begins just behind the head of the doubtful one,
-because its end may be false. A chunk is taken if its checksum or the summary confirms it.
+because its end may be wrong. A chunk is accepted if its checksum or the summary confirms it.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ StampOf = Callable[[Channel, Schema | None, records.Message], int | None]
 
 
 class Gap(NamedTuple):
-    """Bytes that make no sense, up to ``end`` (excluded)."""
+    """Invalid bytes from ``offset`` up to ``end`` (excluded)."""
 
     offset: int
     end: int
@@ -72,7 +72,7 @@ class Scan:
         self.schemas = dict(self.summary.schemas)
         self.channels = dict(self.summary.channels)
         self.conflicts: list[tuple[int, Schema | Channel]] = []
-        """Descriptions that contradict these, with the offsets of them or their chunks."""
+        """Descriptions that contradict known ones, with the offset of each or of its chunk."""
         self.late: list[Schema | Channel] = []
         """Descriptions behind the data, from a summary that is not reliable."""
         self.gaps: list[Gap] = []
@@ -229,7 +229,7 @@ class Scan:
         return self.schemas if isinstance(record, Schema) else self.channels
 
     def define(self, record: Any, offset: int | None = None) -> None:
-        """Learn a new description; if one from the data contradicts a known one, note that."""
+        """Add a new description; note one from the data that contradicts a known one."""
         other = self.described(record).setdefault(record.id, record)
         # Each conflict is tried on messages, so their number is limited.
         if offset is None or record == other or len(self.conflicts) >= 64:
@@ -238,7 +238,7 @@ class Scan:
             self.conflicts.append((offset, record))
 
     def look(self, number: int) -> Mapping[int, records.Entries]:
-        """Walk through a chunk; learn its channels, and return the places of its messages."""
+        """Walk through a chunk; add its channels, and return the places of its messages."""
         chunk = self.chunks[number]
         content = self.reader.read(chunk)
         messages: dict[int, array[int]] = defaultdict(partial(array, "Q"))
@@ -335,7 +335,7 @@ class Scan:
         return not self.channels or channel_id in self.channels
 
     def _chunk(self, record: Record) -> records.Chunk:
-        """Read a chunk's head, which gives the length twice; the summary gives it a third time."""
+        """Return the chunk by its head, which gives the length twice, and by the summary."""
         heads, agrees, size = list[records.Chunk](), False, len(self.source)
         listed = self.summary.chunks.get(record.offset)
         with suppress(BadRecord):
@@ -404,7 +404,7 @@ class Scan:
             yield from sorted(offset for offset in offsets if offset < at + records.BLOCK)
 
     def _is_believed(self, record: Record, doubted: Record) -> bool:
-        """Return whether this looks like a record of the log by more than chance."""
+        """Return whether these bytes are a record of the log, and hardly by chance."""
         opcode, content = record.opcode, record.content
         in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
         if opcode == CHUNK:

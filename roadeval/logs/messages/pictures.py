@@ -328,7 +328,7 @@ class Video:
         return 4 * steps.count(1) >= 3 * len(steps) > 0
 
     def _follows(self, packet: Picture, last: Picture | None, numbers: FrameNumbers) -> bool:
-        """Return whether no packet that this one depends on is known to be lost before it."""
+        """Return False if a packet that this one depends on is known to be lost."""
         is_gap = codec_of(packet) == "h264" and numbers.is_gap(bytes(packet.data))
         if numbers.are_counted or last is None:
             return not is_gap

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from os.path import commonprefix
 from typing import Any, Final
 
 import numpy as np
@@ -107,7 +108,7 @@ def image_names(topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader])
 def lens_at(
     topics: Sequence[TopicInfo], readers: Mapping[str, TopicReader], log_time_ns: int
 ) -> Calibration | None:
-    """Return the calibration and mounting that have an image's log time, if there are any."""
+    """Return the calibration and mounting that are logged at an image's log time, if any."""
     lens, transforms = None, dict[str, Transform]()
     with suppress(*_UNREADABLE):
         for topic in topics:
@@ -122,9 +123,9 @@ def lens_at(
 
 
 def shared_parts(one: str, other: str) -> int:
-    """Count the parts at the beginning that two paths share."""
-    pairs = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
-    return next((n for n, (a, b) in enumerate(pairs) if a != b), 1)
+    """Return the number of parts at the beginning that two paths share."""
+    paths = [path.strip("/").split("/") for path in (one, other)]
+    return len(commonprefix(paths))  # noqa: RUF071 - of lists it compares part by part
 
 
 def _read_lens(

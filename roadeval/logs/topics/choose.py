@@ -42,7 +42,7 @@ SAME_WORDS: Final = {
     "centre": "center",
     "middle": "center",
 }
-"""Words of cameras' names, by their synonyms."""
+"""Words that replace their synonyms in cameras' names, by the synonym."""
 
 
 class Choice(NamedTuple):
@@ -151,7 +151,7 @@ def lossy_labels(name: str, format_: str) -> str:
 
 
 def _clear_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
-    """Return the topics of the best kind that is present."""
+    """Return the topics of the clearest kind that is present: by name, plain masks, by colour."""
     with_words = [(t, words(t.name)) for t in roads]
     by_name = [t for t, n in with_words if n & LABEL_WORDS or (n & MASK_WORDS and n & ROAD_WORDS)]
     coloured, single = ([t for t in by_name if t.channels == n] for n in (3, 1))

@@ -23,10 +23,10 @@ from roadeval.logs.messages.pixels import lossy_format, raw_format, to_labels
 from roadeval.logs.settings import NS
 
 CACHE: Final = 16 << 20
-"""Bytes of a topic's small messages in memory. A label's stamp is read long before its picture, and
-its chunk, which holds mostly other topics, is no longer in memory then."""
+"""Bytes of a topic's small messages in memory. A label's stamp is read long before its picture: by
+then its chunk, which holds mostly other topics, is no longer in memory."""
 ENOUGH: Final = 5
-"""Number of steps from message to message from which the rate is computed."""
+"""The rate of a topic is computed from more intervals between messages than this."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
 
@@ -47,8 +47,8 @@ class TopicInfo:
     last_ns: int | None = None
     """Log times of the first and the last message, None if there is none."""
     rate_hz: float | None = None
-    """One over the median time between messages; None below two messages. If they were not all
-    placed, it is the median of one chunk, or the mean."""
+    """One over the median time between messages; None below two messages. If the times of some were
+    not read, it is the median of one chunk, or the mean."""
     gaps: tuple[tuple[int, int], ...] = ()
     """Log times around each step of more than 2.5 median periods, for images only."""
     format: str = ""
@@ -338,9 +338,9 @@ class TopicReader:
 
     @property
     def sure(self) -> int:
-        """The number of messages, from the first one on, with certainly the recorded positions.
+        """The number of messages, from the first one on, that certainly have the recorded position.
 
-        Damage may have taken an unknown number of messages before the others.
+        An unknown number of messages may be lost before the others.
         """
         if self._lacks_files:
             return 0

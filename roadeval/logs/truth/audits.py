@@ -1,4 +1,4 @@
-"""Folders of labels that were corrected, and the settings of all others: ``audit.json``."""
+"""Folders of corrected labels, and in ``audit.json`` the settings of the drive's other labels."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ Config = TypeVar("Config", bound=LogConfig)
 
 
 def without_corrections(config: Config) -> tuple[Config, list[str]]:
-    """Return settings that read a drive's own labels, and the audits that correct these.
+    """Return settings that read a drive's own labels, and the folders of audits that correct them.
 
-    The labels that an audit corrects may be corrected ones themselves: the latest audit is first.
-    A `LogError` if an audit is damaged.
+    An audit may correct an earlier one: the latest audit is first. A `LogError` if one is damaged.
     """
     folders = list[str]()
     while config.truth.path and (path := Path(config.truth.path, AUDIT)).is_file():

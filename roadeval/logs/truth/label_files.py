@@ -38,7 +38,7 @@ _UNREADABLE: Final = (*_BAD_FORMAT, LogError, BadMessage, ImageError)
 
 
 def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = None) -> LabelSet:
-    """List the labels in a folder or a file; for labels to correct those in their own folder.
+    """List the labels in a folder or a file; of a pick or an audit the labels in its subfolder.
 
     Files of an annotation tool come before images, which may be the annotated ones. If the folder
     itself has no labels, the folders below it are searched. ``size`` is the width and height of the
@@ -52,7 +52,7 @@ def labels_in(path: Path, size: Size | None, settings: MaskSettings | None = Non
             raise LogError("no label in it yet", where=path, remedy=remedy)
     if path.is_file() and path.suffix.lower() not in _formats():
         names = sorted({format_.name for formats in _formats().values() for format_ in formats})
-        remedy = f"known are folders of images, and {', '.join(names)}"
+        remedy = f"give a folder of images, or a file of {', '.join(names)}"
         raise LogError("no file of labels", where=path, remedy=remedy)
     endings = IMAGES | {NPY} | _formats().keys()
     files = [path] if path.is_file() else list_files(path, endings, below=True)
@@ -70,7 +70,7 @@ def _find_labels(
     """Return the labels in some files; None if there are none. Adds to the ``problems``."""
     images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
     labels = prefer_ids(images)
-    # If Cityscapes' images of ids are there, the polygons that they were made of are left out.
+    # Cityscapes' images of ids are made from its polygons, which are then left out.
     for ending, format_list in _formats().items() if labels is images else ():
         of_ending = [file for file in files if file.suffix.lower() == ending]
         filled = (file for file in of_ending if file.is_file() and file.stat().st_size)

@@ -1,6 +1,6 @@
-"""The meaning of the labels of one source, which is settled before the first frame.
+"""The meaning of the labels of one source: from values, colours or confidences to truth.
 
-It turns values, colours or confidences of label pictures into truth.
+It is determined before the first frame.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ NAME_THEM: Final = Sentence(
 LONG: Final = 80
 """Greatest number of letters of a class's name in results."""
 RARE: Final = 0.05
-"""A smaller share of the labelled pixels is hardly the road before a vehicle."""
+"""A class with a smaller share of the labelled pixels is probably not the road."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,7 +248,7 @@ Meaning = ClassMap | Confidence
 def count_values(
     picture: Picture, labels: LabelSettings, name: str, limits: Limits, file: Path | None = None
 ) -> Mapping[int, int]:
-    """Count the pixels of each value, or of each packed colour, of a label picture.
+    """Return the number of pixels by value, or by packed colour, of a label picture.
 
     ``file`` is the picture's own file, if any. A `BadMessage` if it cannot be decoded. A `LogError`
     if it has colours, but the settings name none, or if it is compressed with loss.
@@ -330,10 +330,10 @@ def find_meaning(
 
 
 def find_class_meaning(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
-    """Find the meaning of drawn labels by the names of their classes.
+    """Return the meaning of drawn labels by the names of their classes.
 
-    If the only class is called road, it means road, and one that is called ignore beside it is
-    ignored. A `LogError` if the settings name no class of road, or one that does not occur.
+    If only the classes road and ignore occur, they mean what they say. A `LogError` if the settings
+    name no class of road, or one that does not occur.
     """
     classes = origin.classes
     road, ignored = labels.road, labels.ignore
@@ -362,10 +362,10 @@ def _as_named(
     text: Callable[[Any], str] = str,
     ending: str = "",
 ) -> ClassMap:
-    """Return the meaning of values, colours or classes, some of which are named.
+    """Return the meaning of values, colours or classes, given those that are road or ignored.
 
-    ``codes`` are the values of those that occur, ``there`` lists them in words; ``ending`` ends the
-    names of the settings. A `LogError` if a named one does not occur.
+    ``codes`` has the values of all that occur, ``there`` lists them in words; ``ending`` ends the
+    names of the settings. A `LogError` if one of road or ignored does not occur.
     """
     meaning: dict[int, int] = {}
     words: list[list[str]] = []
@@ -505,10 +505,10 @@ def source_beside_log(
     offset_ms: float = 0.0,
     names: Mapping[str, str] | None = None,
 ) -> LabelSource:
-    """Settle labels with names, or of a topic of another ``log``; the offset delays their stamps.
+    """Return the source of labels in files, or in a topic of another ``log``.
 
-    ``names`` are those of `meaning_of`. A `LogError` if none belongs to a frame, or they have
-    another size or no clear meaning.
+    ``offset_ms`` is added to their stamps; `meaning_of` explains ``names``. A `LogError` if no
+    label belongs to a frame, or they have another size or no clear meaning.
     """
     notes: tuple[str, ...] = ()
     if isinstance(labels, NamedLabels):
@@ -519,13 +519,13 @@ def source_beside_log(
         where, words = f"{labels.name} of {log}" if log else labels.name, by
         words = words if settings.pair else camera.clock
     else:
-        problem = "only labels with names can be paired so, and those of a log have none"
+        problem = "only labels in files can be paired by name, and these are in a log"
         raise LogError(problem, setting="truth.images")
     if by == "stamp":
         pairing = by_time(labels, camera, offset_ms)
         check_times(pairing, labels.name)
     elif offset_ms:
-        problem = f"only stamps can be moved, and {where} is paired by {by}"
+        problem = f"only stamps can be moved, but {where} is paired by {by}"
         raise LogError(problem, setting="topics.sync_offset_ms")
     else:
         pairing = by_number(labels, settings, camera.images)
@@ -547,7 +547,7 @@ def log_and_topic(path: str) -> tuple[str | None, str | None]:
 
 
 def label_files(settings: LabelPlace) -> list[Path]:
-    """Return the files with labels, and the images that give them their frames.
+    """Return the files with labels, and the images by which they are paired.
 
     They need not exist. An OSError if a folder cannot be listed.
     """
@@ -608,10 +608,10 @@ def meaning_of(
     shown: str = "road",
     names: Mapping[str, str] | None = None,
 ) -> Meaning:
-    """Find the meaning of labels by looking at some; check the size of labels beside the log, too.
+    """Return the meaning of labels from some of them; check the size of those beside the log.
 
-    The masks show road, or what ``shown`` names; ``names`` are those of values, as the log tells
-    them. A `LogError` if their values have no clear meaning.
+    The masks show road, or what ``shown`` names; ``names`` are the log's names of values. A
+    `LogError` if the values have no clear meaning.
     """
     origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
     stated = settings.labels.with_values(labels.name, names, origin.classes)

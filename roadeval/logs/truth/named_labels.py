@@ -1,4 +1,4 @@
-"""Labels beside the log, and the frame of each by its name.
+"""Labels in files beside the log, each paired with a frame by its name.
 
 A name contains the frame's number or its time, or is the name of an image.
 """
@@ -78,7 +78,7 @@ class NamedLabels:
     origin: LabelSet
     """All labels of the folder or file, and their classes."""
     log_times: npt.NDArray[np.int64]
-    """``(n,)``: the keys, rising."""
+    """``(n,)`` int64: the keys, ascending."""
     by: str
     """The kind of the keys: ``number``, ``stamp`` or ``name``."""
     limits: Limits
@@ -86,7 +86,7 @@ class NamedLabels:
     first: int = 0
     """The number in the name of the first frame's label."""
     nameless: int = 0
-    """Number of further labels that have the name of no image."""
+    """Number of further labels whose names are no image's."""
     images: int | None = None
     """Number of images in the folder that names are compared with; None without such a folder."""
 

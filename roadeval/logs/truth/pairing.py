@@ -28,8 +28,8 @@ from roadeval.logs.truth.named_labels import NamedLabels
 from roadeval.runtime.sentence import Sentence
 
 REACH: Final = 4
-"""Messages to look at on either side, because topics are logged nearly in the order of stamps. If
-the first stamps rise, only messages within so many frame periods: others cost a chunk each."""
+"""Number of messages to compare on either side: topics are logged nearly in the order of stamps. If
+the first stamps rise, only messages within so many frame periods, since each may cost a chunk."""
 LOOKED_AT: Final = 10
 """Number of first images that decide how labels are paired."""
 
@@ -38,7 +38,7 @@ LabelPictures = TopicReader | NamedLabels
 
 
 class Stamps(Protocol):
-    """The stamps of pictures, or numbers that take their place; they nearly rise."""
+    """The stamps of pictures, or numbers in place of them, in nearly ascending order."""
 
     def __len__(self) -> int: ...
 
@@ -48,7 +48,7 @@ class Stamps(Protocol):
 
 
 class Times:
-    """Rising numbers that take the place of stamps; only the first ``sure`` of them are certain."""
+    """Ascending numbers in place of stamps; only the first ``sure`` of them are certain."""
 
     def __init__(
         self, times: Sequence[int] | npt.NDArray[np.int64], sure: int | None = None
@@ -169,7 +169,7 @@ class Pairing:
     tolerance: int
     """Largest difference between the stamps of a pair."""
     period: int = 0
-    """Nanoseconds from image to image by log times; 0 if that is useless."""
+    """Median nanoseconds between the log times of images; 0 if it is not used."""
     is_small: bool = False
     """Whether all stamps may be read to find an equal one."""
     by: str = Clock.STAMP
@@ -177,7 +177,7 @@ class Pairing:
     unused: int = 0
     """Labels that belong to no frame of the log, if that is known beforehand."""
     note: str = ""
-    """Its unusual properties, in words."""
+    """A warning about the pairing; empty without one."""
     unsure: int = 0
     """Frames without a label because their number is uncertain: an unknown number of images, or of
     the other log's labels, is lost before them."""
@@ -197,10 +197,10 @@ def _rise(stamps: Stamps) -> bool:
 
 
 class Partners:
-    """Finds the label of each image, fastest for one image after the other.
+    """Finds the label of each image; it is fastest with images in order.
 
     The first search begins at the label position ``near``. If only a ``few`` of the images are
-    needed, distant stamps are estimated by log times instead of being read.
+    needed, distant stamps are not read but estimated from log times.
     """
 
     def __init__(self, pairing: Pairing, near: int = 0, *, few: bool = False) -> None:
@@ -302,7 +302,7 @@ def frames_of(
 ) -> Iterator[int]:
     """Yield the position of each label's image, in the order of the labels from ``begin`` on.
 
-    ``few`` is that of `Partners`.
+    `Partners` explains ``few``.
     """
     images, labels = pairing.images, pairing.labels
     back = Partners(replace(pairing, images=labels, labels=images), few=few)
@@ -428,9 +428,9 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
 def _find_clock(
     images: TopicReader, labels: NamedLabels, tolerance_ns: int, offset: int
 ) -> tuple[Clock, str]:
-    """Return whether the times in the labels' names are stamps or log times, and a note on that.
+    """Return whether the times in the labels' names are stamps or log times, and a warning.
 
-    They are log times if none is the stamp of an image, and they follow or are nearer to log times,
+    They are log times if none is the stamp of an image, and they lie after or nearer to log times,
     which belong to other frames than the nearest stamps.
     """
     keys, logged = labels.log_times + offset, images.log_times

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from roadeval.data import ROAD, Truth
 from roadeval.logs.errors import LogError
@@ -33,9 +33,9 @@ class Why(StrEnum):
     """Why a frame was picked."""
 
     RANDOM = "random"
-    """Drawn by chance: the error rate of the drive is estimated from these."""
+    """Drawn at random: these estimate the error rate of the drive."""
     RANKED = "ranked"
-    """Most in doubt: they are for looking at, and for training."""
+    """Among the most doubtful: these are for inspection and training."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +86,13 @@ class Picks:
             return None
         try:
             picks = TypeAdapter(cls).validate_python(read_json(read_bounded(path)))
-        except (OSError, ValueError, ValidationError) as error:
-            reason = str(error).partition("\n")[0]
-            raise LogError(
-                f"damaged ({reason})", where=path, remedy="pick into a new folder"
-            ) from error
-        if problem := picks._contradiction():
-            raise LogError(
-                f"not as roadeval pick writes it ({problem}): take the file as it was "
-                "written, or pick into a new folder",
-                where=path,
-            )
+        except (OSError, ValueError) as error:
+            reason, remedy = str(error).partition("\n")[0], "pick into a new folder"
+            raise LogError(f"damaged ({reason})", where=path, remedy=remedy) from error
+        if contradiction := picks._contradiction():
+            problem = f"not as roadeval pick writes it ({contradiction})"
+            remedy = "take the file as it was written, or pick into a new folder"
+            raise LogError(problem, where=path, remedy=remedy)
         return picks
 
     @classmethod
@@ -149,9 +145,9 @@ class Picks:
         if labels.by == "number" and others:
             raise LogError(
                 f"{len(others)} of {len(keys)} labels have numbers of frames that were not "
-                f"picked ({first_names(others)}): give them the names of their images in "
-                f"{IMAGES}",
+                f"picked ({first_names(others)})",
                 where=labels.name,
+                remedy=f"give them the names of their images in {IMAGES}",
             )
 
     def is_proposal(self, stamp_ns: int, truth: Truth) -> bool:

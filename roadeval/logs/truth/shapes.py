@@ -155,8 +155,8 @@ class Runs(NamedTuple):
 class Undrawn(NamedTuple):
     """A shape with unknown pixels.
 
-    If its class is ignored, its box stands for it. Its image is lost if its class is road, or is
-    ignored and the shape has no box. A shape of another class is left out with a note.
+    If its class is ignored, its box is ignored in place of it. If its class is road, or it is
+    ignored and has no box, its image is lost. A shape of another class is left out with a note.
     """
 
     label: str
@@ -269,8 +269,8 @@ class LabelFormat:
     ending: str
     """The ending of its files, in lower case."""
     holds: Callable[[Path, Any], bool]
-    """Whether a parsed file is of this format; of formats with one ending the first that says so
-    reads it, in the order of their modules' names."""
+    """Return whether a parsed file is of this format. If several formats with the same ending
+    match, the first reads it, in the order of their modules' names."""
     read: Callable[[Path, Any, Size | None], Iterable[DrawnLabel]]
     """Return the label of each image in a parsed file of this format, given the size of the log's
     images. A `LogError` or `BadMessage` describes a label that cannot be used; a KeyError,

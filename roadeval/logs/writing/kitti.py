@@ -34,7 +34,7 @@ def truth_files(folder: Path) -> list[Path]:
 
 
 def road_mask(truth: bytes) -> Image:
-    """Return a file of truth as a mask: its blue is road, and without red it is ignored, 128."""
+    """Return the ``(H, W)`` uint8 mask of a truth file: 255 blue, 0 red alone, 128 without red."""
     red, _, blue = np.moveaxis(to_rgb(truth, Limits()) > 0, 2, 0)
     return np.where(red, 255 * blue, 128).astype(np.uint8)
 

@@ -1,4 +1,4 @@
-"""The writers of camera logs from images, a video, or results; Foxglove and Rerun open them too.
+"""Writers of camera logs from images, a video, or results; Foxglove and Rerun can open the logs.
 
 Viewers merge open files by time, so the messages of a sidecar of results have the stamps and log
 times of the images. The camera's log is not changed.
@@ -352,7 +352,7 @@ def _list_labels(masks: Path, images: Path) -> Sequence[Path]:
             raise
         refused = LogError.of(error)
         refused.remedy = (
-            "labels of an annotation tool are for the packed log: pack without them, then "
+            "labels of an annotation tool belong to the packed log: pack without them, then "
             f"roadeval replay LOG.mcap --truth {masks} --truth-images {images}"
         )
         raise refused from error

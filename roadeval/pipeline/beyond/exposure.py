@@ -11,18 +11,13 @@ from typing import Final
 from roadeval.data import Layer, LayerKind, LayerSpec
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.scene import expose_by_patch
-from roadeval.pipeline.stage import Output, Stage, View, per_view, stage_settings
+from roadeval.pipeline.stage import NoSettings, Output, Stage, View, per_view
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
 
 
-@stage_settings
-class ExposureSettings:
-    """The exposure has no settings: the reference patch decides."""
-
-
 @per_view
-def bind(_settings: ExposureSettings, _learnt: None, view: View) -> Output:
+def bind(_settings: NoSettings, _learnt: None, view: View) -> Output:
     """Expose the image of a view."""
     image = expose_by_patch(view.image, ReferencePatch())
     return Output((Layer(EXPOSED, image),), image=image)
@@ -31,7 +26,7 @@ def bind(_settings: ExposureSettings, _learnt: None, view: View) -> Output:
 STAGE: Final = Stage(
     name="exposure",
     title="Exposure by the reference patch",
-    settings=ExposureSettings,
+    settings=NoSettings,
     bind=bind,
     layers=(EXPOSED,),
     preprocesses=True,

@@ -67,10 +67,10 @@ def colour(scene: Scene) -> Named:
 
 
 def light(scene: Scene) -> Named:
-    """Return log brightness less the lower half's, and the row's; and the row's median colour.
+    """Return log brightness relative to the lower half and to the row, and a row's median colour.
 
-    It is a second exposure that does not trust the patch: if that lies in the shade of a lorry, the
-    sunlit road is too bright compared with it, but not compared with the lower half of the image.
+    These features do not depend on the patch: if it lies in the shade of a lorry, the sunlit road
+    is too bright compared with it, but not compared with the lower half of the image.
     """
     bright = scene.tones[0]
     return {
@@ -101,8 +101,8 @@ def place(scene: Scene) -> Named:
 def texture(scene: Scene) -> Named:
     """Return the root of the mean absolute slope of the log brightness, and its deviation.
 
-    Slopes across and down are apart in each window: kerbs, wheels and house fronts have edges of
-    one direction, leaves of both.
+    Slopes across and down are separate features: kerbs, wheels and house fronts have edges in one
+    direction, leaves in both.
     """
     slopes = {"across": np.abs(scene.slopes[0]), "down": np.abs(scene.slopes[1])}
     bright = scene.tones[0]

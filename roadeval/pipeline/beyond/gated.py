@@ -1,15 +1,15 @@
 """A shadow filter with a learnt gate: dark road becomes as bright as the lit road of its frame.
 
-The paper's filter (`shadow`) takes every pixel with a high NDI for shadow. This one estimates for
-every dark pixel how probable it is road in the shade, and brightens it in proportion: it has no
+The paper's filter (`shadow`) takes every pixel with a high NDI for shadow. This one estimates the
+probability that a dark pixel is road in the shade, and brightens the pixel in proportion: it has no
 regions and no hard threshold. If the training frames show no road in the shade, nothing is learnt,
 and every frame stays unchanged, bit for bit.
 
-A shadow, a dark car and a hedge may have one colour. The filter learns to tell them apart, as the
-shadow detector of Guo, Dai and Hoiem does [1]_, but by pixel: a logistic regression on the
+A shadow, a dark car and a hedge may have the same colour. The filter learns to tell them apart, as
+the shadow detector of Guo, Dai and Hoiem does [1]_, but by pixel: a logistic regression on the
 surroundings of a dark pixel, on its place, and on the ground between it and the vehicle. All
 brightness is relative to the frame's own sunlit road, so that it holds for any exposure. The stages
-after it see colours alone and need the same light in each frame: the stage `exposure` comes before
+after it see only colours and need the same light in each frame: the stage `exposure` comes before
 it in the preset.
 
 References
@@ -100,10 +100,9 @@ COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image"
 class GatedSettings:
     """Settings of the gated filter.
 
-    odds: Factor of the odds that a candidate is shaded road. A greater one brings back more dark
-        road, and brightens more pixels that are not road. A classifier on colours takes all of
-        those for road, and needs a small factor; one that sees place and surroundings as well works
-        with 1.
+    odds: Factor of the odds that a candidate is shaded road. A greater one brightens more dark
+        road, but also more pixels that are not road. A classifier on colours calls these road, and
+        needs a small factor; one that also sees place and surroundings works with 1.
     """
 
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
@@ -128,8 +127,8 @@ class GatedView:
 def look(image: Rgb, place: Floats) -> GatedView:
     """Find the sunlit level, lit road's colour and the candidates of a working image.
 
-    Nearly every frame has some lit road among the pixels that are probably road by place alone: the
-    level found there is within a tenth of the true one; by the colour of road, within a third.
+    Nearly every frame has some lit road among the pixels that are probably road by their place. The
+    level of these is within a tenth of the true one; by the colour of road it is within a third.
     """
     height, width = image.shape[:2]
     total = sum(cv2.split(image.astype(np.uint16)))

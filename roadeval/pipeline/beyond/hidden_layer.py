@@ -1,8 +1,8 @@
 """A network with one hidden layer as plain arrays, and how it is trained.
 
-It sees each feature as its rank among the training pixels: then a distance that grows without
-bound, or an odd light, moves no input further than any other value does. Trees err in steps along
-single features, planes through all features elsewhere: the mean of both errs less.
+Each feature is replaced by its rank among the training pixels, so that an extreme distance or light
+gives no extreme input. Trees split single features, planes combine all of them: their errors
+differ, and the mean of both errs less.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class HiddenLayer:
 
     @property
     def inputs(self) -> int:
-        """How many features of a pixel it sees."""
+        """Number of features of a pixel."""
         return len(self.lowest)
 
     def sums(self, values: Values) -> Values:

@@ -1,4 +1,4 @@
-"""The threshold on how probable road is, chosen where training frames have the fewest errors."""
+"""A threshold on the probability of road: the one with the fewest errors on the training frames."""
 
 from __future__ import annotations
 
@@ -9,14 +9,9 @@ import numpy as np
 
 from roadeval.data import CERTAIN, Layer, Packed, Probability, best_code, histogram, mask_spec
 from roadeval.pipeline import stage
-from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
+from roadeval.pipeline.stage import NoSettings, Output, Stage, StageError, TrainingSet, View
 
 THRESHOLD: Final = mask_spec("threshold", "Road above the threshold of the training frames")
-
-
-@stage.stage_settings
-class ThresholdSettings:
-    """The threshold has no settings: all labelled pixels of the training frames decide."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +28,11 @@ class Threshold:
 def codes_of(opinion: Output | None) -> Probability:
     """Return the codes of probability of the stage before; a `StageError` if it has none."""
     if opinion is None or opinion.probability is None:
-        raise StageError("threshold: the stage before does not say how probable road is")
+        raise StageError("threshold: the stage before it gives no probability of road")
     return opinion.probability
 
 
-def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
+def fit(sample: TrainingSet, _settings: NoSettings) -> Threshold:
     """Choose the threshold with the fewest wrong pixels among all labelled ones."""
     pairs = zip(sample.opinions, sample.truths, strict=True)
     counts = [histogram(codes_of(opinion), truth) for opinion, truth in pairs]
@@ -45,7 +40,7 @@ def fit(sample: TrainingSet, _settings: ThresholdSettings) -> Threshold:
 
 
 @stage.per_view
-def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
+def bind(_settings: NoSettings, learnt: Threshold, view: View) -> Output:
     """Return the pixels where road is more probable than the threshold."""
     road = Packed.of(codes_of(view.opinion) > learnt.code)
     facts = {"threshold": learnt.code / CERTAIN}
@@ -55,7 +50,7 @@ def bind(_settings: ThresholdSettings, learnt: Threshold, view: View) -> Output:
 STAGE: Final = Stage(
     name="threshold",
     title="Threshold of the training frames",
-    settings=ThresholdSettings,
+    settings=NoSettings,
     bind=bind,
     layers=(THRESHOLD,),
     fit=fit,

@@ -1,6 +1,6 @@
 """Boosted trees on the features of a pixel: how probable road is.
 
-The log-odds of road are the weighted mean of two opinions: the sum of many small decision trees,
+The log-odds of road are the weighted mean of two estimates: the sum of many small decision trees,
 each grown to correct the errors of the trees before it [1]_, and a network with one hidden layer
 (`hidden_layer`). A term that is not learnt is subtracted:
 ``x = mean - w s max(d - 1, 0)`` with the distance d from the reference patch, 1 where roads end,
@@ -255,9 +255,9 @@ class Blend:
         return bool(is_known or (self.base and self.base.knows(image)))
 
     def log_odds(self, values: Values, weight: Values | float) -> Values:
-        """Return the weighted mean of both for each pixel of ``(inputs, n)`` features, ``(n,)``.
+        """Return the log-odds of road for each pixel of ``(inputs, n)`` features, ``(n,)``.
 
-        ``weight`` is the network's, 0 to 1: one number, or ``(n,)``. The base uses the same.
+        ``weight`` is the network's in the mean, 0 to 1: one number, or ``(n,)``, also for the base.
         """
         if self.base is not None:
             values = np.concatenate([values, self.base.log_odds(values, weight)[None]])
@@ -328,8 +328,8 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     """Return the network's weight in the mean for ``(F, n)`` features, ``(n,)`` float32.
 
     Trees that fit their few frames to the last pixel are over-confident by a factor of two or more,
-    and would outvote the network. So it has two thirds in the light, and one third in the shade,
-    where it misses more road.
+    and would outvote the network. So the network's weight is two thirds in the light, and one third
+    in the shade, where it misses more road.
     """
     names = names_of(settings.features)
     if LIGHT not in names:
@@ -348,8 +348,8 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
         scene, planes = see(settings, view.image, view.opinion)
         if len(planes) != learnt.inputs:
             raise StageError(
-                f"trees: {len(planes)} features of a pixel, and it has learnt from {learnt.inputs}:"
-                " the stage before says how probable other classes of road are"
+                f"trees: a pixel has {len(planes)} features, but the model was trained on "
+                f"{learnt.inputs}: the stage before it gives other classes of road than then"
             )
         far, (light,) = reach(scene), light_over(scene, SUNLIT).values()
         weight = settings.reach_weight
@@ -371,7 +371,7 @@ def bind(settings: TreesSettings, learnt: Blend) -> Callable[[View], Output]:
 
 
 def layers(settings: TreesSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers; if the stage before is heard, it has a ``probability`` of its own."""
+    """Return the layers; with ``opinion`` the stage before it may have a ``probability``, too."""
     share = replace(PROBABILITY, name="tuned_probability") if settings.opinion else PROBABILITY
     return GEODESIC, share, TREES
 

@@ -1,7 +1,7 @@
 """Phase 2, the shadow filter (section 3.2): finds shadow and gives it the colours around it.
 
-It has hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8),
-components and buffer rings (Eq. 9-10), their compensation (Eq. 11), and the stage.
+The steps are hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8),
+components and buffer rings (Eq. 9-10), and their compensation (Eq. 11).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class ShadowSettings:
         definitions printed beside it, which lands at the edge of the histogram.
     inclusive: Whether the code of the threshold itself is shadow, as printed in Eq. 8. Otsu's upper
         class begins above it.
-    connectivity: Neighbours that make one component (Eq. 9): 8 or 4.
+    connectivity: Number of neighbours of a pixel in a component (Eq. 9): 8 or 4.
     ring_width: Number of 3x3 dilations that make a buffer ring (Eq. 10), at most 16: the work grows
         with its square.
     max_gain: Upper bound of the contrast gain of Eq. 11; none as printed. Gains above 3 are common.

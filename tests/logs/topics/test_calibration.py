@@ -196,6 +196,12 @@ def test_of_several_the_one_of_the_camera_is_taken(tmp_path: Path):
         assert lens.topic == "/front/info"
 
 
+def test_a_calibration_may_lie_below_the_topic_of_the_images(tmp_path: Path):
+    infos = {f"/rig/{side}/info": info() for side in ("left", "right")}
+    lens, _ = lens_in(ros2(tmp_path / "rig.mcap", infos, TREE, "/rig/left"))
+    assert lens.topic == "/rig/left/info"
+
+
 @pytest.mark.parametrize(
     ("fields", "reason"),
     [

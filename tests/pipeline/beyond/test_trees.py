@@ -176,7 +176,7 @@ def test_trees_that_hear_nothing_say_so():
     with pytest.raises(StageError, match="asks for a stage before it"):
         trees.bind(heard, learnt)(VIEW)
     more = replace(VIEW, opinion=Output(mask=sample.opinions[0].mask))
-    with pytest.raises(StageError, match="how probable other classes"):
+    with pytest.raises(StageError, match="gives other classes of road"):
         trees.bind(heard, learnt)(more)
     with pytest.raises(MisfitError, match="train it again"):
         trees.bind(SMALL, learnt)

@@ -24,9 +24,8 @@ def read(
     annotations = defaultdict(list)
     for annotation in content["annotations"]:
         if "segments_info" in annotation:
-            raise LogError(
-                "COCO panoptic", where=path, remedy="save its masks as PNG files, one a frame"
-            )
+            remedy = "save its masks as PNG files, one a frame"
+            raise LogError("COCO panoptic", where=path, remedy=remedy)
         annotations[annotation["image_id"]].append(annotation)
     for number in annotations.keys() - images.keys():
         raise LogError(f"annotations are of image {number}, which is not listed", where=path)
@@ -41,12 +40,9 @@ def _by_id(path: Path, what: str, listed: Iterable[Mapping[str, Any]]) -> dict[A
     numbered: dict[Any, Mapping[str, Any]] = {}
     for entry in listed:
         if numbered.setdefault(entry["id"], entry) is not entry:
-            raise LogError(
-                f"two entries have the {what} id {entry['id']}, so it is not certain what an "
-                "annotation belongs to",
-                where=path,
-                remedy="merge the files by a tool that numbers them anew",
-            )
+            problem = f"two entries have the {what} id {entry['id']}, so annotations are ambiguous"
+            remedy = "merge the files by a tool that numbers them anew"
+            raise LogError(problem, where=path, remedy=remedy)
     return numbered
 
 

@@ -33,11 +33,8 @@ def read(path: Path, content: Any, _: shapes.Size | None) -> Iterator[shapes.Dra
     names = {name for table in tables if isinstance(table, dict) for name in table}
     usual = [name for usual in _CLASS for name in sorted(names) if name.lower() == usual]
     if len(names) > 1 and not usual:
-        raise LogError(
-            f"its regions have the attributes {', '.join(sorted(names))}",
-            where=path,
-            remedy="rename the one that is the class to 'class'",
-        )
+        problem = f"its regions have the attributes {', '.join(sorted(names))}"
+        raise LogError(problem, where=path, remedy="rename the one that is the class to 'class'")
     attribute = next(iter([*usual, *names]), "class")
     for image in _images(content):
         polygons = (
