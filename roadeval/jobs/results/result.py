@@ -210,6 +210,8 @@ class DriveResult:
         A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
         are left out, and so are sums over all frames.
         """
+        if name == "regions":  # the largest by far, of which little is kept
+            return self._table(name)
         if name not in self._read:
             self._read[name] = self._table(name)
         return self._read[name]
