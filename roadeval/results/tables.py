@@ -7,12 +7,14 @@ import hashlib
 import json
 import math
 import zlib
+import os
 from collections.abc import Collection, Container, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
@@ -72,46 +74,62 @@ def read_table(
     like numbers; rates are float64, all other numbers int64. A `ResultsError` if the table is
     damaged, or not the one that is stated.
     """
+    import pyarrow as pa
+
     table = TABLES[name]
     where = source if isinstance(source, Path) else f"the recording's table {name}"
     try:
         if isinstance(source, Path):
             check_input(source)
-        content = source.encode() if isinstance(source, str) else _read_csv(source)
+        file = BytesIO(source.encode()) if isinstance(source, str) else _open_csv(source)
     except FileNotFoundError:
-        content = b""
+        file = BytesIO()
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise ResultsError(f"{where}: damaged ({error}); {_ANEW}") from error
     except OSError as error:
         raise ResultsError(f"{where}: {error.strerror}") from error
-    if stated is not None:
-        _check_stated(where, content, stated.get(name))
-    lines = content.splitlines() if stated is None else []
     try:
-        if len({*lines}) < len(lines):
-            raise ValueError("a row is there twice")
-        rows: pd.DataFrame = _parse_csv(content or table.header.encode(), table).to_pandas()
+        with file:
+            if stated is not None:
+                _check_stated(where, file, stated.get(name))
+            lines = file.readlines() if stated is None else []
+            if len({*lines}) < len(lines):
+                raise ValueError("a row is there twice")
+            content = file if file.tell() else BytesIO(table.header.encode())
+            parsed = _parse_csv(content, table)
+            # Each column leaves Arrow's memory as it enters pandas's. Of one chunk it would be a
+            # view, which nobody can write to.
+            rows: pd.DataFrame = parsed.to_pandas(
+                split_blocks=parsed[0].num_chunks > 1, self_destruct=True
+            )
     except ValueError as error:  # Arrow's too
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
+    except OSError as error:
+        raise ResultsError(f"{where}: {error.strerror}") from error
+    pa.default_memory_pool().release_unused()
     return rows[rows["camera"] == camera] if camera else rows
 
 
-def _read_csv(path: Path) -> bytes:
-    """Read a file, of a compressed one what it unpacks to, if that is not far too much."""
+def _open_csv(path: Path) -> BinaryIO:
+    """Open a file, or what a compressed one unpacks to, if that is not far too much."""
     if path.suffix != ".gz":
-        return path.read_bytes()
+        return path.open("rb")
     most = UNPACKED + 100 * path.stat().st_size
     with gzip.open(path) as file:
         content = file.read(most + 1)
     if len(content) > most:
         raise gzip.BadGzipFile(f"it unpacks to more than {most:,} bytes")
-    return content
+    return BytesIO(content)
 
 
-def _check_stated(where: Path | str, content: bytes, stated: TableFacts | None) -> None:
-    rows = max(content.count(b"\n") - 1, 0)
-    actual = TableFacts(rows, hashlib.sha256(content).hexdigest())
+def _check_stated(where: Path | str, file: BinaryIO, stated: TableFacts | None) -> None:
+    digest, ends = hashlib.sha256(), 0
+    for part in iter(partial(file.read, 1 << 20), b""):
+        digest.update(part)
+        ends += part.count(b"\n")
+    rows = max(ends - 1, 0)
+    actual = TableFacts(rows, digest.hexdigest())
     if actual == stated or (stated is None and not rows):
         return
     stated_rows = stated.rows if stated else 0
@@ -124,7 +142,7 @@ def _check_stated(where: Path | str, content: bytes, stated: TableFacts | None) 
     raise ResultsError(f"{where}: does not agree with its summary ({difference}); {_ANEW}")
 
 
-def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
+def _parse_csv(file: BinaryIO, table: TableSchema) -> pa.Table:
     """Parse CSV and check it; a ValueError tells what is wrong with it."""
     import pyarrow as pa
     from pyarrow import csv
@@ -132,8 +150,11 @@ def _parse_csv(content: bytes, table: TableSchema) -> pa.Table:
     words = pa.dictionary(pa.int32(), pa.string())  # each distinct word is held once
     types = [(c.name, words if c.is_word else TYPES[c.kind]) for c in table.columns]
     options = csv.ConvertOptions(column_types=pa.schema(types))
-    parsed = csv.read_csv(BytesIO(content), convert_options=options)
-    if not content.endswith(b"\n"):
+    file.seek(-1, os.SEEK_END)
+    has_end = file.read() == b"\n"
+    file.seek(0)
+    parsed = csv.read_csv(file, convert_options=options)
+    if not has_end:
         raise ValueError("its last line is cut off")
     complete = [c.name for c in table.columns if c.kind not in (Kind.RATE, Kind.NUMBER)]
     parsed = _check_columns(parsed, table.columns, complete).unify_dictionaries()

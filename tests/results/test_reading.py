@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from roadeval.evaluation.score.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, windows
 from roadeval.results.rows import Key, csv_lines, sum_rows, table_of_scores
-from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES
+from roadeval.results.schema import OF_A_DRIVE, OF_DRIVES, TABLES, Kind
 from roadeval.results.tables import ResultsError, TableFacts, read_table
 from tests.evaluation.making import a_table, table_of
 from tests.results.making import KEY
@@ -218,3 +219,22 @@ def test_every_table_begins_with_its_drive_and_camera_and_is_of_one_drive_or_of_
         [n for n in table.names if n != "rank"][:2] == ["drive", "camera"]
         for table in TABLES.values()
     )
+
+
+def test_a_long_table_is_read_in_pieces_and_can_be_written_to_like_a_short_one(tmp_path):
+    header = TABLES["changes"].header
+    cells = ["1" if column.kind is Kind.COUNT else 40 * "n" for column in TABLES["changes"].columns]
+    for count in (1, 50_000):
+        path, content = tmp_path / "changes.csv", f"{header}{(','.join(cells) + chr(10)) * count}"
+        path.write_text(content)
+        facts = TableFacts(count, hashlib.sha256(content.encode()).hexdigest())
+        tracemalloc.start()
+        try:
+            table = read_table("changes", path, {"changes": facts})
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert len(table) == count
+        assert count == 1 or peak < len(content)
+        table.loc[0, "N"] = 5
+        assert table["N"].iloc[0] == 5

@@ -298,8 +298,10 @@ def _compare_two(
         finals = finals[finals["variant"] != BASELINE]
         if several:
             drives += _drive_changes(new.label, drive_names, finals, settings)
-        new_regions = new.table("regions", {key: key for key in new_keys.values()})
-        parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
+        # A whole table of regions takes more memory than all else: only one is there at a time.
+        sources = ((new, {key: key for key in new_keys.values()}), (base, new_keys))
+        counted = [tables.finals(side.table("regions", keys)) for side, keys in sources]
+        parts = pairing.common_regions(finals, *counted)
         regions.append(by_drive(parts, ["variant", "region"], groups))
     if not masks:
         raise ComparisonError(

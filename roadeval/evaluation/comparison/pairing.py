@@ -59,7 +59,8 @@ class Side:
     def table(self, name: str, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
         """Return some drives' rows of the variants to compare, under the comparison's names.
 
-        A mapping of drives gives their keys in the comparison; drives and cameras are text then.
+        A mapping of drives gives their keys in the comparison; if one of them differs, drives and
+        cameras are text.
         """
         rows = self.tables(name, drives)
         if isinstance(drives, Mapping):
@@ -67,8 +68,9 @@ class Side:
             if unknown := {*keys} - drives.keys():
                 key = " ".join(min(unknown))
                 raise RoadevalError(f"a table has rows of {key}, which is not compared")
-            names = np.array([drives[key] for key in keys] or np.zeros((0, 2)), object)[places]
-            rows = rows.assign(drive=names[:, 0], camera=names[:, 1])
+            if any(drives[key] != key for key in keys):
+                names = np.array([drives[key] for key in keys], object)[places]
+                rows = rows.assign(drive=names[:, 0], camera=names[:, 1])
         if self.variants is None or "variant" not in rows:
             return rows
         rows = rows[rows["variant"].isin([*self.variants])]
@@ -178,17 +180,21 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     numbered = numbered.assign(pair=np.arange(len(pairs)))
     words = dict.fromkeys((*KEY, "variant", "stage", "region"), "str")
     by = [*KEY, "variant"]
-    on = ["pair", *by, "region"]
+    on = ["pair", "region"]
     sides = []
     for table, end in ((base, "_base"), (new, "")):
         keys = {"stage": f"stage{end}", "frame": f"frame{end}"}
-        rows = table[table["stage"].isin(numbered[f"stage{end}"].unique())]
-        rows = rows.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
+        rows = table.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
         rows = numbered.astype({f"stage{end}": "str", **dict.fromkeys(by, "str")}).merge(rows)
         sides.append(rows[[*on, *COUNTS]])
-    both = sides[0].merge(sides[1], on=on, how="outer", suffixes=("_base", ""), indicator="in")
-    counts = both[[*COUNTS, *(f"{name}_base" for name in COUNTS)]].fillna(0).astype(np.int64)
-    both[counts.columns] = counts
+    del rows  # as the sides are: of a long drive they are most of the memory
+    both = sides.pop(0).merge(
+        sides.pop(), on=on, how="outer", suffixes=("_base", ""), indicator="in"
+    )
+    counts = [*COUNTS, *(f"{name}_base" for name in COUNTS)]
+    both[counts] = both[counts].fillna(0).astype(np.int64)
+    for name in by:
+        both[name] = pairs[name].astype("category").array[both["pair"].to_numpy()]
     road, road_base = both["TP"] + both["FN"], both["TP_base"] + both["FN_base"]
     other, other_base = both["TN"] + both["FP"], both["TN_base"] + both["FP_base"]
     same, labelled = (road == road_base) & (other == other_base), road + other > 0
@@ -196,7 +202,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     parts = group_rows(both, [*by, "region"])
     in_both = parts[["labelled", "in_new"]].transform("any").all(axis=1)
     shared = parts["same"].transform("all") & in_both
-    both = both[shared & both["labelled"]].sort_values("pair", kind="stable")
+    both = both[shared & both["labelled"]]  # by pair, as the merge sorts them
     stamps = pairs["stamp_ns"].to_numpy()[both["pair"]]
     both = both.assign(stamp_ns=stamps, final=True)
     tested = {TESTED: METRICS[TESTED]}

@@ -54,6 +54,8 @@ if TYPE_CHECKING:
 
 OF_ALL: Final = ("code of ", "network ")
 """Beginnings of the names that `input_digests` gives to files of all drives of a fleet."""
+KEPT_ROWS: Final = 500_000
+"""Rows of a table that stays in memory; a larger one is read again, as of most little is used."""
 NO_NUMBER: Final = ("output", "run", "fleet", "labels.names", "frames.disturb")
 """Tables of a run's settings that change no number."""
 
@@ -210,9 +212,12 @@ class DriveResult:
         A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
         are left out, and so are sums over all frames.
         """
-        if name not in self._read:
-            self._read[name] = self._table(name)
-        return self._read[name]
+        rows = self._read.get(name)
+        if rows is None:
+            rows = self._table(name)
+            if len(rows) <= KEPT_ROWS:
+                self._read[name] = rows
+        return rows
 
     def _table(self, name: str) -> pd.DataFrame:
         match name:
