@@ -6,8 +6,8 @@ import gzip
 import hashlib
 import json
 import math
-import zlib
 import os
+import zlib
 from collections.abc import Collection, Container, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
