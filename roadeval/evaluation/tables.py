@@ -197,6 +197,15 @@ def finals(table: pd.DataFrame) -> pd.DataFrame:
     return table[is_final(table)]
 
 
+def word_type(*columns: pd.Series) -> pd.CategoricalDtype:
+    """Return one type for columns of words, which are merged without becoming text."""
+    import pandas as pd
+
+    return pd.CategoricalDtype(
+        sorted({str(word) for column in columns for word in column.unique()})
+    )
+
+
 def pair_rows(base: pd.DataFrame, new: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
     """Return the rows that two tables share by the columns ``on``, in the base's order.
 

@@ -178,14 +178,15 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
     """
     numbered = pairs[[*KEY, "variant", "stage", "stage_base", "frame", "frame_base"]]
     numbered = numbered.assign(pair=np.arange(len(pairs)))
-    words = dict.fromkeys((*KEY, "variant", "stage", "region"), "str")
     by = [*KEY, "variant"]
     on = ["pair", "region"]
+    regions = tables.word_type(base["region"], new["region"])
     sides = []
     for table, end in ((base, "_base"), (new, "")):
-        keys = {"stage": f"stage{end}", "frame": f"frame{end}"}
-        rows = table.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
-        rows = numbered.astype({f"stage{end}": "str", **dict.fromkeys(by, "str")}).merge(rows)
+        names = {"stage": f"stage{end}", "frame": f"frame{end}"}
+        rows = table[[*by, *names, "region", *COUNTS]].rename(columns=names)
+        words = {n: tables.word_type(numbered[n], rows[n]) for n in (*by, f"stage{end}")}
+        rows = numbered.astype(words).merge(rows.astype({**words, "region": regions}))
         sides.append(rows[[*on, *COUNTS]])
     del rows  # as the sides are: of a long drive they are most of the memory
     both = sides.pop(0).merge(
