@@ -223,15 +223,18 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str 
             files[-1].begin()
             # Pages have checksums, for Arrow's ZSTD has none. Of short tables the statistics,
             # dictionaries of numbers, and Arrow's own copy of the schema would be two fifths.
-            parquet.write_table(
-                made.cast(schema).replace_schema_metadata(about),
+            # Without that copy the schema's metadata is not written: it is added to the file's.
+            with parquet.ParquetWriter(
                 files[-1].partial,
+                schema,
                 compression="zstd",
                 write_page_checksum=True,
                 write_statistics=False,
                 use_dictionary=[field.name for field in schema if field.type == pa.string()],
                 store_schema=False,
-            )
+            ) as writer:
+                writer.write_table(made.cast(schema))
+                writer.add_key_value_metadata(about)
         for file in files:
             file.publish()
 

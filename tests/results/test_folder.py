@@ -29,7 +29,8 @@ from roadeval.results.facts import Facts, FrameAccount, LogFacts, digest_of
 from roadeval.results.fleet import FleetFolder, FleetWriter, Made, cached_path, read_made
 from roadeval.results.folder import ResultsFolder, ResultsWriter, names_of_results
 from roadeval.results.schema import OF_A_DRIVE as ALL_TABLES
-from roadeval.results.tables import ResultsError, read_parquet
+from roadeval.results.schema import TABLES
+from roadeval.results.tables import FLEET_FORMAT, ResultsError, made_of, read_parquet
 from tests.evaluation.making import a_frame, a_variant, pixels
 from tests.evaluation.test_scoreboard import effects_of
 from tests.results.fleet.making import fleet_of
@@ -430,6 +431,20 @@ def test_a_cached_table_that_has_gone_is_made_anew(folder, name):
     FleetWriter(folder).finish(FleetFolder(folder).facts.drives, EvaluationSettings(), {}, "")
     assert cached_path(folder, name, drive).exists()
     assert FleetFolder(folder).table(name).equals(rows)
+
+
+def test_each_table_states_its_format_and_what_it_was_made_of_and_a_new_cache_stays(folder):
+    paths = [*folder.glob("*.parquet"), *folder.glob("*/*/*.parquet")]
+    for path in paths:
+        stated = parquet.read_metadata(path).metadata
+        assert json.loads(stated[b"roadeval"]) == FLEET_FORMAT
+        assert stated[b"about"].decode() == TABLES[path.stem].doc
+        if path.parent != folder:
+            summary = folder / "results" / path.parent.name / "summary.json"
+            assert made_of(path) == hashlib.sha256(summary.read_bytes()).hexdigest()
+    inodes = [path.stat().st_ino for path in folder.glob("*/*/*.parquet")]
+    FleetWriter(folder).finish(FleetFolder(folder).facts.drives, EvaluationSettings(), {}, "")
+    assert [path.stat().st_ino for path in folder.glob("*/*/*.parquet")] == inodes
 
 
 @pytest.mark.parametrize("table", ["drives", "scores", "effects"])
