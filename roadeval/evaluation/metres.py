@@ -135,8 +135,8 @@ class Survey:
     def digits(self) -> list[Bits]:
         """The binary digits of each pixel's number of cells, ``(H, words)`` each.
 
-        The lowest digit of a stance comes first. To count the cells of some pixels, count
-        the pixels that have each digit, multiply by the digit's value, and add up.
+        The lowest digit of a stance comes first. To count the cells of some pixels, count the
+        pixels that have each digit, multiply by the digit's value, and add up.
         """
         digits = range(max(1, int(self._cells.max()).bit_length()))
         return [pack((cells >> digit) & 1) for cells in self._cells for digit in digits]

@@ -220,7 +220,7 @@ def scene_ns(stamps: pd.Series[int]) -> int:
 
 
 def near_ns(stamps: pd.Series[int] | Sums) -> int:
-    """Return the least time between frames that are not neighbours: at most 1 second."""
+    """Return the least time between non-neighbours: a 30th of the drive, at most 1 second."""
     return min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
 
 

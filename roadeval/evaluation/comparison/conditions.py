@@ -90,7 +90,7 @@ class Condition:
                 "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'; a 'surely' "
                 "after pp means the whole interval"
             )
-        stage, variant, rate, sign, number, unit, surely = match.groups()
+        stage, variant, rate, comparator, number, unit, surely = match.groups()
         if rate not in QUANTITIES:
             remedy = f"there are {', '.join(QUANTITIES)}"
             raise ConditionError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
@@ -104,7 +104,7 @@ class Condition:
             remedy = f"'surely' goes with {', '.join(COMPARED)}"
             raise ConditionError(f"{rate} has no interval", where=repr(text), remedy=remedy)
         limit = float(number), unit == "pp", bool(surely)
-        return cls(" ".join(text.split()), stage, variant, rate, sign, *limit)
+        return cls(" ".join(text.split()), stage, variant, rate, comparator, *limit)
 
     def judge(self, mask: MaskChange) -> Judgement:
         """Judge the condition on the change of the mask that it names."""

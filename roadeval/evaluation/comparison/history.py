@@ -42,7 +42,7 @@ class Line(NamedTuple):
     stage: str
     """The stage of the final mask."""
     kind: str
-    """``all``, ``region``, ``class``, or a tag; a tag with one of these names has its column's."""
+    """``all``, ``region``, ``class``, or a tag's name; its column if that is one of the three."""
     part: str
     """The region, the class, or the value of the tag."""
     rate: str
@@ -274,8 +274,8 @@ def judge_last(
             continue
         if difference.low is not None and difference.high is not None:
             mean, noise = difference.mean, 2 * line.noise * math.sqrt(1 + 1 / len(runs[0]))
-            low, high = (math.hypot(mean - end, noise) for end in (difference.low, difference.high))
-            difference = replace(difference, low=mean - low, high=mean + high)
+            below, above = (math.hypot(mean - b, noise) for b in (difference.low, difference.high))
+            difference = replace(difference, low=mean - below, high=mean + above)
         new = float(line.rates[-1])
         base = new - difference.mean
         rate = condition.rate

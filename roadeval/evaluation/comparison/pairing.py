@@ -88,10 +88,10 @@ NAMED: Final = 5
 """Greatest number of drives named as left out, and of frames named as changed or disagreeing."""
 
 
-def left_out(names: Sequence[str], of: str, why: str) -> str:
+def left_out(names: Sequence[str], result: str, why: str) -> str:
     """Return a sentence that names the drives left out of a result, and the reason."""
     drives = "1 drive is" if len(names) == 1 else f"{len(names)} drives are"
-    return f"{drives} left out of {of} ({why}): {first_of(names, NAMED)}"
+    return f"{drives} left out of {result} ({why}): {first_of(names, NAMED)}"
 
 
 def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
@@ -187,7 +187,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
         rows = table.astype(words).rename(columns=keys)[[*by, *keys.values(), "region", *COUNTS]]
         rows = numbered.astype({f"stage{end}": "str", **dict.fromkeys(by, "str")}).merge(rows)
         sides.append(rows[[*on, *COUNTS]])
-    del rows  # as the sides are released: they take most of the memory of a long drive
+    del rows  # released like the sides: they take most of the memory of a long drive
     both = sides.pop(0).merge(
         sides.pop(), on=on, how="outer", suffixes=("_base", ""), indicator="in"
     )

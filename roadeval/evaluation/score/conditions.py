@@ -157,12 +157,12 @@ class FrameConditions:
         import pandas as pd
 
         columns, tables = ["frame", "wrong", "N"], []
-        for (of, part), numbers in self._parts.items():
+        for (owner, part), numbers in self._parts.items():
             name, truth = part, "other"
             if isinstance(part, int):
                 value, name, truth = classes[part] if classes else (0, "", "ignored")
                 name = f"{ON_CLASS}{name or f'class {value}'}"
-            if of == variant and truth != "ignored":
+            if owner == variant and truth != "ignored":
                 rows = pd.DataFrame(np.reshape(numbers, (-1, 3)), columns=columns)
                 if truth == "road":
                     rows["wrong"] = rows["N"] - rows["wrong"]

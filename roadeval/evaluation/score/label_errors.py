@@ -159,7 +159,7 @@ def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFra
 def _carry_label(near: LabelledView, view: LabelledView) -> Plane | None:
     """Return the label of a frame, ``(H, W)``, moved with the picture to another frame.
 
-    It is `_UNKNOWN` where the moved picture differs from the other frame; None if it is narrow.
+    Pixels where the moved picture differs are `_UNKNOWN`; None if the picture is narrow.
     """
     import cv2
 

@@ -91,10 +91,10 @@ class Unlabelled:
         before, variants = self._before, result.variants if result.doubts else ()
         self._before = now = {v.variant: mask for v in variants for _, mask in v.masks()}
         doubts = []
-        for still in result.doubts:
-            name = still.variant
+        for without_flicker in result.doubts:
+            name = without_flicker.variant
             changed = _share(now[name], before[name]) if name in before else math.nan
-            doubt = replace(still, flicker=changed)
+            doubt = replace(without_flicker, flicker=changed)
             doubts.append(doubt)
             self._stages[name] = doubt.stage
             if name == self.focus:

@@ -203,12 +203,12 @@ class _Search:
             p = tested.p_holm
             if p is None or p >= 1 - confidence or _ratios(sides) < LEAST_RATIO:
                 continue
-            of = [c for place in places if (c := conditions[place])]
+            met = [c for place in places if (c := conditions[place])]
             frames = int((flags & ~self._searching).sum())
             wrong, rest, labelled, rest_labelled = sides.sum(axis=-1).tolist()
             rates, ratio = (wrong / labelled, rest / rest_labelled), float(_ratios(sides))
             ends, worst = self._interval(sides, ratio, confidence), self._worst(flags, part)
-            slices.append(Slice(of, part, frames, *rates, ratio, *ends, p, *worst))
+            slices.append(Slice(met, part, frames, *rates, ratio, *ends, p, *worst))
         return sorted(slices, key=lambda confirmed: -confirmed.ratio)
 
     def _conditions(self) -> Iterator[tuple[FrameCondition | None, Flags]]:
@@ -271,14 +271,14 @@ class _Search:
         usable = np.isfinite(scores) & np.isfinite(ratios) & (ratios > 1)
         return np.where(usable, scores, 0), np.where(usable, ratios, 0)
 
-    def _sides(self, flags: Flags, part: str, rows: Flags, units: Places, of: str = "") -> Floats:
-        """Return the sides: ``part`` where ``flags`` are set is inside, the rest of ``of`` outside.
+    def _sides(self, flags: Flags, part: str, rows: Flags, units: Places, pool: str = "") -> Floats:
+        """Return the sides: ``part`` under ``flags`` is inside, the rest of part ``pool`` outside.
 
         Over drives they are weighted, see `_within_drives`.
         """
         starts = np.flatnonzero(np.diff(units[rows], prepend=-1))
         sides = []
-        for pixels, everywhere in zip(self._pixels[part], self._pixels[of], strict=True):
+        for pixels, everywhere in zip(self._pixels[part], self._pixels[pool], strict=True):
             inside = flags[..., rows] * pixels[rows]
             outside = everywhere[rows] - inside
             sides += [np.add.reduceat(side, starts, axis=-1) for side in (inside, outside)]
