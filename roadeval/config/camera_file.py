@@ -12,10 +12,10 @@ from roadeval.runtime.sentence import Sentence
 
 
 def read_camera(path: str | Path, topic: str | None = None) -> dict[str, Any]:
-    """Return the settings of `ground` in a file; with several cameras, those of a ``topic``.
+    """Return the settings of `ground` from a file; ``topic`` chooses one of several cameras.
 
-    The file of a tool may also have ``height``, ``pitch`` and ``roll``, which the tool does not
-    write. A `ConfigError` if there are no settings to read, or it is not clear which.
+    The user may add ``height``, ``pitch`` and ``roll`` to a calibration tool's file. A
+    `ConfigError` if the file has no usable camera, or it is not clear which one is meant.
     """
     if Path(path).suffix.lower() not in (".yaml", ".yml"):
         return read_tables(path)
@@ -51,7 +51,7 @@ def read_camera(path: str | Path, topic: str | None = None) -> dict[str, Any]:
 
 
 def _choose_camera(path: str | Path, document: Mapping[str, Any], topic: str) -> Mapping[str, Any]:
-    """Return the pinhole camera of Kalibr's file that has a topic, or the only one."""
+    """Return the pinhole camera of Kalibr's file that is on ``topic``, or the only camera."""
     chain = {name: camera for name, camera in document.items() if "cam" in name}
     topics = {name: str(camera.get("rostopic", "")) for name, camera in chain.items()}
     names = [name for name, begin in topics.items() if begin and topic.startswith(f"{begin}/")]
@@ -62,6 +62,6 @@ def _choose_camera(path: str | Path, document: Mapping[str, Any], topic: str) ->
         raise ConfigError(f"several cameras, {cameras}", where=path, remedy=choose)
     camera: Mapping[str, Any] = chain[name]
     if camera["camera_model"] != "pinhole":
-        problem = f"{name} is of the model {camera['camera_model']}, no pinhole"
-        raise ConfigError(problem, where=path)
+        problem = f"{name} has the camera model {camera['camera_model']}"
+        raise ConfigError(problem, where=path, remedy="calibrate it as a pinhole camera")
     return camera

@@ -78,7 +78,7 @@ class RunConfig(LogConfig):
     extra: tuple[Variant, ...] = ()
     """Further variants."""
     only: tuple[str, ...] = ()
-    """The variants that run, masks of other methods included; all of them by default."""
+    """Names of the variants that run, masks of other methods included; empty for all."""
     cameras: tuple[CameraSettings, ...] = ()
     """The cameras of a rig; empty if one camera is replayed."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
@@ -119,7 +119,7 @@ class RunConfig(LogConfig):
         names = [visible(camera.name or camera.image) for camera in self.cameras]
         for name in names:
             if names.count(name) > 1:
-                raise ConfigError("given twice", where=f"camera {name}")
+                raise ConfigError("the name is given twice", where=f"camera {name}")
             if name.strip("/").partition("/")[0] in RESERVED:
                 remedy = "give it another under [[cameras]]"
                 raise ConfigError("the name is reserved", where=f"camera {name}", remedy=remedy)
@@ -127,10 +127,10 @@ class RunConfig(LogConfig):
         single = [f"topics.{name}" for name in topics if getattr(self.topics, name)]
         single += ["ground"] * self.ground.given
         if names and single:
-            problem, remedy = "belongs to one of several cameras", "name it under [[cameras]]"
+            problem, remedy = "belongs to one of several cameras", "set it under [[cameras]]"
             raise ConfigError(problem, setting=single[0], remedy=remedy)
         if names and (self.truth.path or self.masks):
-            problem = "labels that do not lie in the log belong to one camera"
+            problem = "labels from files belong to one camera, and there are several"
             raise ConfigError(problem, remedy="replay that camera alone")
 
     def variants(self) -> tuple[Variant, ...]:
@@ -141,14 +141,14 @@ class RunConfig(LogConfig):
         return tuple(v for v in variants if not self.only or v.name in self.only)
 
     def names(self) -> list[str]:
-        """Name every variant that runs: those that are computed, then masks of other methods."""
+        """Return the names of all variants that run, masks of other methods last."""
         topics = (self.topics.masks, *(camera.masks for camera in self.cameras))
         masks = [name for named in (*topics, self.masks) for name in named]
         names = dict.fromkeys([*(variant.name for variant in self.variants()), *masks])
         return [name for name in names if not self.only or name in self.only]
 
     def brought(self) -> list[str]:
-        """Name the variants that were brought beside those of the preset, as in `names`."""
+        """Return the names of the variants that are not the preset's, in the order of `names`."""
         preset_names = {variant.name for variant in variants_of(self.pipeline, (), self.preset)}
         return [name for name in self.names() if name not in preset_names]
 
@@ -166,7 +166,7 @@ class RunConfig(LogConfig):
         configs = {}
         for camera in self.cameras:
             topics: dict[str, Any] = {"image": camera.image, "masks": camera.masks}
-            # If [topics] has an empty name for truth or shadow, no camera has a topic of it.
+            # An empty topic of truth or shadow under [topics] means that no camera has one.
             for name in ("truth", "shadow"):
                 if (topic := getattr(camera, name)) is not None:
                     topics[name] = topic
@@ -180,7 +180,7 @@ class RunConfig(LogConfig):
         return {variant.name: variant.pipeline for variant in self.variants()}
 
     def others_code(self) -> dict[str, str]:
-        """Return the digests of stages that are not part of roadeval, by their names in a chain."""
+        """Return the code digests of other packages' stages, by their names in a chain."""
         return {
             name: stage.code
             for pipeline in self.pipelines().values()
@@ -198,8 +198,8 @@ class RunConfig(LogConfig):
         for name, pipeline in self.pipelines().items():
             if len(pipeline.masks()) < 2:  # one of the final stage, and one before it
                 chain = ", ".join(pipeline.chain)
-                problem = f"its chain ({chain}) has no stage before {FINAL_STAGE} that makes a "
-                raise ConfigError(f"{problem}road mask", where=f"variant {name}")
+                problem = f"no stage of its chain ({chain}) makes a road mask for {FINAL_STAGE}"
+                raise ConfigError(problem, where=f"variant {name}", remedy="add such a stage")
         config = self._with_pipelines(Pipeline.resolved)
         brought = self.brought()
         by_itself = focus_of(self.names())
@@ -216,7 +216,7 @@ class RunConfig(LogConfig):
         return replace(self, pipeline=change(self.pipeline), extra=extra)
 
     def override(self, tables: Mapping[str, Any]) -> RunConfig:
-        """Return the configuration with the values of some tables in place.
+        """Return the configuration, changed by the values of some tables.
 
         The tables have the shape of a TOML file, without ``preset``; a variant replaces one of the
         same name. A `ConfigError` for a key or a value that cannot be used, with what is allowed.
@@ -242,14 +242,15 @@ class RunConfig(LogConfig):
             raise ConfigError("cameras must be tables, each under [[cameras]]")
         for table in rig:
             if not table.get("image"):
-                raise ConfigError(f"[[cameras]] {table.get('name', '')}: image must name its topic")
+                where = f"[[cameras]] {table.get('name', '')}".rstrip()
+                raise ConfigError("image must name its topic", where=where)
         cameras = (override(CameraSettings(table["image"]), table, "cameras") for table in rig)
         return replace(config, cameras=tuple(cameras))
 
     def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
-        """Return the configuration with further variants, each in place of one of the same name.
+        """Return the configuration with further variants; one replaces a variant of the same name.
 
-        A `ConfigError` if something else has the name.
+        A `ConfigError` if masks or a default variant have the name.
         """
         extra = {variant.name: variant for variant in (*self.extra, *variants)}
         return replace(self, extra=tuple(extra.values()))
@@ -277,7 +278,7 @@ class RunConfig(LogConfig):
         return {mask.name for mask in settings if mask is not None}
 
     def for_training(self) -> RunConfig:
-        """Return the configuration with only those masks from which variants learn."""
+        """Return the configuration with all variants, but only the masks that they use."""
         masks = {name: masks for name, masks in self.masks.items() if name in self.input_masks()}
         return replace(self, masks=masks, only=())
 
@@ -295,7 +296,8 @@ class RunConfig(LogConfig):
         """Return the configuration with the drive's name in the paths of masks and truth."""
         for name, masks in self.masks.items():
             if not masks.path:
-                raise ConfigError(f"[masks.{name}] has no path: a folder, or LOG.mcap:/topic")
+                remedy = "give a folder, or LOG.mcap:/topic"
+                raise ConfigError(f"[masks.{name}] has no path", remedy=remedy)
         used = {*self.masks, *self.topics.masks}
         if self.only:
             used &= {*self.only, *self.input_masks()}
@@ -308,7 +310,7 @@ class RunConfig(LogConfig):
         )
 
     def ignored_settings(self) -> tuple[str, ...]:
-        """Return a note on each setting of a variant's preset that the run does not follow."""
+        """Return a note on each setting that a variant's preset asks for and the run ignores."""
         return tuple(
             f"{variant.name}: preset {variant.preset} asks for {section}.{key} = {value}, but all "
             f"variants of a run are trained and scored alike ({getattr(settings, key)})"
@@ -346,7 +348,7 @@ class RunConfig(LogConfig):
 
 
 def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> RunConfig:
-    """Return the configuration of a preset with the values of some tables in place.
+    """Return the configuration of a preset, changed by the values of some tables.
 
     Parameters
     ----------
@@ -389,7 +391,7 @@ def load_config(path: str | Path, *, trusted: bool = True) -> RunConfig:
 
 
 WIDTH: Final = 100
-"""Letters of a line of comments."""
+"""Greatest length of a line of comments."""
 _BOUNDS: Final = {
     "minimum": "at least {}",
     "exclusiveMinimum": "above {}",
@@ -411,7 +413,7 @@ def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay
 
 
 def _without_none(value: Any) -> Any:
-    """Return plain data for TOML: without settings that are None, and with lists for tuples."""
+    """Return data for TOML: settings that are None are left out, and tuples become lists."""
     if isinstance(value, Mapping):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
     return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
@@ -425,7 +427,7 @@ def config_toml(config: RunConfig | None = None) -> str:
     Parameters
     ----------
     config
-        The configuration; the defaults of ``roadeval replay`` otherwise. The text can be edited
+        The configuration; by default that of a plain ``roadeval replay``. The text can be edited
         and given to `roadeval.load_config`.
 
     Examples

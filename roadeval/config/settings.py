@@ -19,7 +19,7 @@ SECTIONS: Final = (
 
 
 def _labels(labels: object) -> object:
-    """Return labels of results, whose names are plain, and whose values are a line of text."""
+    """Return labels of results; a ValueError for a bad name, or a value that is no short line."""
     from roadeval.data import is_plain
 
     for name, text in labels.items() if isinstance(labels, Mapping) else ():
@@ -29,7 +29,7 @@ def _labels(labels: object) -> object:
 
 
 def _spare(tables: object) -> object:
-    """Return names of tables of a drive that its results can do without."""
+    """Return names of tables to leave out; a ValueError for one that results need."""
     from roadeval.results.schema import OF_A_DRIVE
 
     spare = [name for name in OF_A_DRIVE if name not in ("frames", "windows")]
@@ -49,15 +49,15 @@ class OutputSettings:
     mcap: Log of masks, error maps and rates, to open beside the drive. Default: none.
     record: Pictures to record: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``. ``masks``
         also records labels and the camera's image. ``worst:K`` records all pictures of the K frames
-        with the highest ERR, in a log without truth with the most uncertain masks; ``every:N``
-        those of every N-th frame. ``none`` makes no recording.
+        with the highest ERR, or with the most uncertain masks if there is no truth; ``every:N``
+        records all pictures of every N-th frame. ``none`` makes no recording.
     focus: Variant that the results are about: verdict, worst frames, thumbnails. Default: the first
-        that you bring, else ``filtered``.
-    labels: Label of the results, as branch=main, which changes no number.
-    figures: Whether the paper's figures are drawn; a fleet does not draw those of its drives.
-    packed: Whether tables are compressed, as ``frames.csv.gz``. Those of a fleet's drives always
-        are.
-    without: Tables to leave out, as ``heat`` or ``regions``, with what a report makes of them.
+        that you add, else ``filtered``.
+    labels: Label of the results, such as branch=main; it changes no number.
+    figures: Whether the paper's figures are drawn; a fleet draws none for its drives.
+    packed: Whether tables are compressed, as ``frames.csv.gz``. A fleet always compresses the
+        tables of its drives.
+    without: Tables to leave out, such as ``heat`` or ``regions``; a report then lacks them too.
     """
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
@@ -93,7 +93,7 @@ class FleetSettings:
         model that learnt from the other folds. Copies of one log are in one group. Without folds
         ``training.model`` scores all drives, or each drive trains its own model.
     keep: Recordings to keep: of ``all`` drives, or ``none``.
-    scheduler: Dask scheduler whose workers replay the drives: ``tcp://host:8786``, or its file.
+    scheduler: Dask scheduler with the workers that replay drives: ``tcp://host:8786``, or a file.
     """
 
     folds: Annotated[int | None, Interval(ge=2, le=1000), Flag("--folds", "K")] = None

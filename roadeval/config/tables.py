@@ -38,7 +38,7 @@ PLAIN_WORDS: Final[Mapping[str, str]] = {
 }
 """Messages by the beginning of pydantic's name of a problem."""
 QUOTED: Final = 60
-"""Letters of a wrong value that a message quotes."""
+"""Greatest length of a wrong value in a message."""
 
 _JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
 
@@ -49,7 +49,7 @@ class ConfigError(RoadevalError):
 
 @contextmanager
 def in_file(where: str) -> Iterator[None]:
-    """Place a `ConfigError` of the block in a file, if there is one: no flag names its settings."""
+    """Add the file ``where``, if any, to errors of the block, and name no flags in them."""
     try:
         yield
     except ConfigError as error:
@@ -73,19 +73,19 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
 
             text = run_toml_in(file)
         else:
-            text = file.read_text(encoding="utf-8-sig")  # some editors begin a file with this mark
+            text = file.read_text(encoding="utf-8-sig")  # a byte order mark may come first
         if text is None:
             problem = "has no configuration because the run was interrupted"
             raise ConfigError(problem, where=file, remedy="replay the drive once more")
         tables = read_toml(text)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+        raise ConfigError(f"cannot be read: {error.strerror}", where=file) from error
     except ValueError as error:
         lines = (text or "").splitlines()
         if unfilled := [line for line in lines if line.partition("#")[0].rstrip().endswith("= ?")]:
             problem = f"has no value yet in the line '{unfilled[0].strip()}'"
             raise ConfigError(problem, where=file, remedy="write one in place of the ?") from error
-        raise ConfigError(f"{path}: cannot be read as TOML: {error}") from error
+        raise ConfigError(f"cannot be read as TOML: {error}", where=file) from error
     if trusted and file.suffix != ".rrd":
         return tables
     variants = tables.get("variants", {})
@@ -103,9 +103,9 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
 
 
 def override(settings: Any, values: Any, table: str) -> Any:
-    """Return a settings dataclass with the values of its table in place.
+    """Return a settings dataclass, changed by the values of its table.
 
-    A `ConfigError`, which names the key, for an unknown one or a value that is not allowed.
+    A `ConfigError` names the key if it is unknown or its value is not allowed.
     """
     if not isinstance(values, Mapping):
         raise ConfigError("must be a table", setting=table)
@@ -114,13 +114,13 @@ def override(settings: Any, values: Any, table: str) -> Any:
     _check(values, settings, table)
     merged = _merge(dataclasses.asdict(settings), values)
     try:
-        # In JSON a list passes a strict check as a tuple, but neither text nor true as a number.
+        # Strict validation of JSON takes lists for tuples, but neither text nor true for numbers.
         json = _JSON.dump_json(merged, fallback=str)
         return adapter(settings.__class__).validate_json(json, strict=True)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         keys, cause = problem["loc"], problem.get("ctx", {}).get("error")
-        # The number of an item is followed by the type that pydantic tried for it.
+        # After the number of an item comes the type that pydantic tried for it.
         names = [*map(str, takewhile(lambda part: isinstance(part, str), keys))]
         setting = ".".join((table, *names))
         if isinstance(cause, SettingError) and cause.setting:
@@ -137,12 +137,12 @@ def adapter(kind: type) -> TypeAdapter[Any]:
 
 
 def list_names(names: Iterable[str]) -> str:
-    """Return names to choose from, in a row."""
+    """Return names as a sorted list with commas."""
     return ", ".join(sorted(names))
 
 
 def quote(value: Any) -> str:
-    """Return a value as in a file, shortened for a message.
+    """Return a value as JSON, shortened for a message.
 
     >>> quote(True)
     'true'
@@ -152,34 +152,31 @@ def quote(value: Any) -> str:
 
 
 def _check(values: Mapping[str, Any], settings: Any, table: str) -> None:
-    """Raise a `ConfigError` for a key that is no setting, or text that no setting can be."""
+    """Raise a `ConfigError` for an unknown key, or for text that no setting can hold."""
     names = None
     if dataclasses.is_dataclass(settings):
         names = [field.name for field in dataclasses.fields(settings)]
     for key, value in values.items():
-        setting = f"{table}.{key}"
+        setting = visible(f"{table}.{key}")
         if names is not None and key not in names:
             if not names:
-                raise ConfigError("it has no settings", setting=setting)
+                raise ConfigError(f"{table} has no settings", setting=setting, remedy="remove it")
             choice = f"{likely(key, names)}choose {list_names(names)}"
             raise ConfigError("there is no such setting", setting=setting, remedy=choice)
+        items = value if isinstance(value, list | tuple) else (value,)
+        texts = [text for text in (key, *items) if isinstance(text, str)]
+        if not all(map(is_utf8, texts)):
+            problem = "its bytes are not UTF-8, which no configuration can hold"
+            remedy = "choose another name, or set PYTHONUTF8=1 if the system has another encoding"
+            raise ConfigError(problem, setting=setting, remedy=remedy)
+        if any("\0" in text for text in texts):
+            raise ConfigError("holds a zero byte, which no name or path may hold", setting=setting)
         if isinstance(value, Mapping):
             _check(value, getattr(settings, key, None), setting)
-        elif isinstance(value, str):
-            if not is_utf8(value):
-                raise ConfigError(
-                    "its bytes are not UTF-8, which no configuration can hold",
-                    setting=setting,
-                    remedy="choose another name, or set PYTHONUTF8=1 where the system speaks "
-                    "another encoding",
-                )
-            if "\0" in value:
-                problem = "holds a zero byte, which no name and no path can"
-                raise ConfigError(problem, setting=setting)
 
 
 def _merge(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return nested tables with values in place."""
+    """Return nested tables, changed by values."""
     merged = dict(base)
     for key, value in values.items():
         inner = merged.get(key)
@@ -191,7 +188,7 @@ def _merge(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]
 
 
 def describe_problem(problem: Mapping[str, Any]) -> str:
-    """Return the message on a problem that pydantic has found, with the value that was given."""
+    """Return the message for a validation error of pydantic, with the wrong value."""
     entry, context = problem["input"], problem.get("ctx", {})
     plain = (words for kind, words in PLAIN_WORDS.items() if problem["type"].startswith(kind))
     message = str(context.get("error", problem["msg"]))

@@ -56,7 +56,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 }
 """Presets by name, each in the shape of a TOML file (see `roadeval.config.run`).
 
-``printed_order`` and ``hsi`` are ``paper`` with one detail as the text has it: the order of
+``printed_order`` and ``hsi`` are ``paper`` with one detail as it is printed: the order of
 post-processing (section 4.4), and the colour space of the compensation (section 4.2, step 5). As
 variants beside ``paper`` they show the effect of that detail.
 
@@ -66,7 +66,7 @@ variant ``unfiltered`` shows the effect of exposure alone.
 ``robust`` keeps every region of its mask, as vehicles divide a road into pieces.
 """
 LONGEST: Final = 64
-"""Letters of a variant's name, which is printed in the columns of tables."""
+"""Greatest length of a variant's name, which is printed in the columns of tables."""
 DRIVE: Final = "{drive}"
 """The placeholder of the drive's name in the path of labels."""
 AS_IT_IS: Final[Mapping[str, Any]] = {"operations": (), "region": "all", "fill": False}
@@ -85,7 +85,7 @@ class Variant:
     pipeline: Pipeline
     preset: str = "paper"
     of_pair: bool = False
-    """Whether it is the pipeline of a run without its filter, beside the one with it."""
+    """Whether it is the run's pipeline without its filter, beside the one with the filter."""
 
     @classmethod
     def of(cls, name: str, tables: Mapping[str, Any], where: str = "") -> Variant:
@@ -120,9 +120,9 @@ def variants_of(
 ) -> tuple[Variant, ...]:
     """Return the variants of a run: with the pipeline's filters, without them, and the extra ones.
 
-    A pipeline without a filter gives one variant, which has the name of its preset if that has no
-    filter, either. A `ConfigError` if the name of an extra variant is taken, reserved, or no plain
-    word.
+    A pipeline without a filter gives one variant: ``unfiltered``, or the name of the preset if the
+    preset has no filter either. A `ConfigError` if the name of an extra variant is taken, reserved,
+    or not plain.
     """
     unfiltered = pipeline.without_filter()
     has_filter = unfiltered != pipeline
@@ -183,7 +183,7 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
 
 
 def _stages_of(chain: Any) -> tuple[Stage, ...]:
-    """Return the stages of a chain; a `ConfigError` if they do not make one."""
+    """Return the stages of a chain; a `ConfigError` if it is not valid."""
     choice = f"choose {list_names(stages.names())}"
     if not isinstance(chain, list | tuple) or not chain:
         raise ConfigError("chain must be a list of stages", remedy=choice)
@@ -197,7 +197,7 @@ def _stages_of(chain: Any) -> tuple[Stage, ...]:
     if len({stage.name for stage in chain_stages}) < len(chain_stages):
         raise ConfigError("a stage can occur only once", where="chain")
     if chain[-1] != FINAL_STAGE:
-        raise ConfigError(f"chain must end with {FINAL_STAGE}, whose mask is the answer")
+        raise ConfigError(f"chain must end with {FINAL_STAGE}, which makes the final mask")
     return tuple(chain_stages)
 
 
@@ -210,8 +210,8 @@ def check_variant_name(name: str, taken: Collection[str]) -> None:
     where = f"variant {name!r}" if len(name) <= LONGEST else f"variant {name[:LONGEST] + '...'!r}"
     if not is_plain(name) or name[0] in "-_" or len(name) > LONGEST:
         raise ConfigError(
-            "a name is made of letters, digits, '-' and '_' alone, begins with a letter or a "
-            f"digit, and has at most {LONGEST} of them",
+            "a name is made of letters, digits, '-' and '_', begins with a letter or a digit, and "
+            f"has at most {LONGEST} characters",
             where=where,
         )
     if name in RESERVED:
@@ -221,11 +221,11 @@ def check_variant_name(name: str, taken: Collection[str]) -> None:
 
 
 def network_variant(name: str, path: str) -> Variant:
-    """Return the variant of a network, whose mask phase 4 leaves as it is.
+    """Return the variant of a network; phase 4 does not change its mask.
 
-    ``path`` is a network, or a TOML file with the settings of the stage ``net``, in which
-    ``file`` is relative to the folder of the TOML file, and ``[post]`` asks for post-processing.
-    The network itself is opened when it is run. A `ConfigError` if a TOML file cannot be used.
+    ``path`` is a network, or a TOML file with the settings of the stage ``net``. In that file
+    ``file`` is relative to the TOML file's folder, and ``[post]`` switches on post-processing. The
+    network itself is opened when it is run. A `ConfigError` if a TOML file cannot be used.
     """
     settings: dict[str, Any] = {"file": path}
     if is_toml := Path(path).suffix == ".toml":
@@ -234,7 +234,8 @@ def network_variant(name: str, path: str) -> Variant:
     chain = ["net", FINAL_STAGE]
     if settings.get("decide") == TRAINED:
         if "threshold" in settings:
-            raise ConfigError(f'threshold has no effect if decide = "{TRAINED}"', where=path)
+            problem = f'threshold has no effect if decide = "{TRAINED}"'
+            raise ConfigError(problem, where=path, remedy="remove one of the two")
         del settings["decide"]
         chain.insert(1, "threshold")
     if not isinstance(file := settings.get("file"), str) or not file:
@@ -248,7 +249,7 @@ def network_variant(name: str, path: str) -> Variant:
 
 
 def thresholded_variant(name: str) -> Variant:
-    """Return the variant of a method's confidences, with the training frames' threshold."""
+    """Return the variant that thresholds a method's confidences; training frames set the limit."""
     chain = ("given", "threshold", FINAL_STAGE)
     return Variant.of(name, {"chain": chain, "given": {"name": name}, "post": AS_IT_IS})
 
@@ -260,9 +261,9 @@ TRAINED: Final = "trained"
 def tuned_variant(name: str, method: Pipeline | None) -> Variant:
     """Return the variant that learns to correct a method.
 
-    It is the preset ``robust``, in which the method's output is a feature of the trees. ``method``
-    is None if another system has made its masks. A `ConfigError` if the method is trained itself,
-    as its output on its training frames is over-confident.
+    It has the preset ``robust``, and the method's output is a feature of its trees. ``method`` is
+    None if another system made the masks. A `ConfigError` if the method is trained itself, because
+    its output on its training frames is over-confident.
     """
     before: tuple[str, ...] = ("given",)
     settings = {"given": {"name": name}}
@@ -296,9 +297,9 @@ def with_masks(current: Masks, tables: Any) -> Masks:
 
 
 def in_drive(place: Place, drive: str | os.PathLike[str]) -> Place:
-    """Return the place of labels with the drive's name in its paths.
+    """Return the place of labels; in its paths `DRIVE` is replaced by the drive's name.
 
-    That is the name of the drive's folder, or of its file without the ending.
+    The name is that of the drive's folder, or of its file without the ending.
     """
     path = Path(drive)
     name = path.name if path.is_dir() else path.stem

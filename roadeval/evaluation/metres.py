@@ -29,18 +29,18 @@ UNPLACED: Final = "no_ground"
 LEFT: Final = "left_edge"
 RIGHT: Final = "right_edge"
 FREE: Final = "free_distance"
-"""Measures of a mask's ends."""
+"""Names of the measures of where a mask's road ends."""
 STEP: Final = 0.004
-"""Metres between the places of a line; the pixels that it crosses are looked up there."""
-FARTHEST: Final = 4000
-"""Greatest number of places of a line."""
+"""Metres between the points of a line at which its pixels are looked up."""
+MOST_POINTS: Final = 4000
+"""Greatest number of points of a line."""
 GAP: Final = 0.3
 """A gap in the road of fewer metres is no edge; straight ahead the limit is `GAP_AHEAD`."""
 GAP_AHEAD: Final = 0.5
 LEVELS: Final = 256
 """Thresholds of KITTI's road benchmark; its confidences have eight bits."""
 Pixels = npt.NDArray[np.intp]
-"""``(n,)``: places in a flat image, or `OUTSIDE`."""
+"""``(n,)``: indices in a flattened image, or `OUTSIDE`."""
 
 
 def plan_of(ground: Ground, settings: EvaluationSettings) -> Plan:
@@ -49,7 +49,7 @@ def plan_of(ground: Ground, settings: EvaluationSettings) -> Plan:
 
 
 def band_name(near: int, far: int) -> str:
-    """Return the name of a band of distance, as a region.
+    """Return the name of the region from ``near`` to ``far`` metres ahead.
 
     >>> band_name(10, 20)
     '10-20m'
@@ -58,9 +58,9 @@ def band_name(near: int, far: int) -> str:
 
 
 class Survey:
-    """The places on the ground of an image's pixels, for images of the size of ``ground``.
+    """Where the pixels of images lie on the ground, for images of the size of ``ground``.
 
-    It is made once, counts masks by distance and from above, and finds where the road ends.
+    It is made once. It divides pixels by distance and into cells, and finds where the road ends.
     """
 
     def __init__(self, ground: Ground, settings: EvaluationSettings) -> None:
@@ -74,7 +74,7 @@ class Survey:
 
     @property
     def stances(self) -> int:
-        """Number of `STANCES` that are counted: only the first without a posed ground."""
+        """Number of `STANCES` that are counted: all if the ground has a pose, else the first."""
         return len(STANCES) if self.ground.is_posed else 1
 
     @cached_property
@@ -93,16 +93,16 @@ class Survey:
 
     @cached_property
     def regions(self) -> dict[str, Bits]:
-        """Regions of a frame: the bands, and the pixels that lie in none of them."""
+        """The bands, and the pixels that lie in no band: ``(H, words)`` each, by region's name."""
         bands = self.bands[0]
         in_bands = unpack(np.bitwise_or.reduce([*bands.values()]), self._shape[1])
         return {**bands, UNPLACED: pack(in_bands == 0)}
 
     def levels(self, probability: Probability, truth: Truth) -> Histogram:
-        """Count cells of the ground seen from above: ``(2, LEVELS)`` uint32, non-road and road.
+        """Count ground cells by truth and level: ``(2, LEVELS)`` uint32, non-road and road.
 
-        Arguments are as of `roadeval.data.histogram`; a level is the greatest of KITTI's thresholds
-        that a probability reaches.
+        Arguments are as in `roadeval.data.histogram`. The level of a probability is the greatest of
+        KITTI's thresholds that it reaches.
         """
         pixels, cells = self._above
         labels = truth.ravel()[pixels]
@@ -113,7 +113,7 @@ class Survey:
 
     @cached_property
     def _cells(self) -> Sums:
-        """Number of cells of the ground seen from above for each pixel, ``(S, H, W)``.
+        """Number of ground cells in each pixel, for each stance: ``(S, H, W)``.
 
         A cell belongs to the pixel in which its centre lies.
         """
@@ -126,7 +126,7 @@ class Survey:
 
     @cached_property
     def _above(self) -> tuple[Pixels, Floats]:
-        """The pixels seen from above by the first stance, and the number of cells of each."""
+        """The pixels that have cells in the first stance, and their numbers of cells: ``(n,)``."""
         cells = self._cells[0].ravel().astype(float)
         pixels = np.flatnonzero(cells)
         return pixels, cells[pixels]
@@ -135,22 +135,22 @@ class Survey:
     def digits(self) -> list[Bits]:
         """The binary digits of each pixel's number of cells, ``(H, words)`` each.
 
-        The lowest digit of a stance comes first. The number of cells of some pixels is a sum over
-        the digits: the number of the pixels that have the digit, times its value.
+        The lowest digit of a stance comes first. To count the cells of some pixels, count the
+        pixels that have each digit, multiply by the digit's value, and add up.
         """
         digits = range(max(1, int(self._cells.max()).bit_length()))
         return [pack((cells >> digit) & 1) for cells in self._cells for digit in digits]
 
     @cached_property
     def _lines(self) -> list[_Line]:
-        """The lines along which a road's ends are searched, for each stance.
+        """The lines on which the ends of the road are searched, for each stance.
 
-        One lies across the road at each distance, and the last one lies straight ahead.
+        One line crosses the road at each distance; the last one runs straight ahead.
         """
         settings = self._settings
         half = settings.plan_width / 2
-        across = np.linspace(half, -half, min(FARTHEST, round(2 * half / STEP)) | 1)
-        ahead = np.geomspace(1.0, settings.distances[-1], FARTHEST)
+        across = np.linspace(half, -half, min(MOST_POINTS, round(2 * half / STEP)) | 1)
+        ahead = np.geomspace(1.0, settings.distances[-1], MOST_POINTS)
         lines = []
         for ground in self._grounds:
             for at in settings.edges_at:
@@ -171,11 +171,11 @@ class Survey:
         return _Line(seen[np.concatenate([[0], steps])], borders.tolist())
 
     def ends(self, masks: Bits, truth: TruthBits) -> Floats:
-        """Return where masks and the truth end, ``(K, S, M, 2)``, see `FrameMetres.ends`.
+        """Return where masks and the truth end, ``(K, S, M, 2)`` metres, see `FrameMetres.ends`.
 
         Across, the truth's road is the one nearest to the line straight ahead, and a mask's road
         the one nearest to the middle of the truth's. A road that leaves the picture, or meets
-        pixels without truth, has no end there. Ahead, both end at the latest where the truth does.
+        pixels without truth, has no end there. Ahead, no road ends beyond the labelled pixels.
         """
         lines, places = self._lines, len(self._settings.edges_at) + 1
         crossed = np.concatenate([line.pixels for line in lines])
@@ -212,7 +212,7 @@ class Survey:
 
 @lru_cache(maxsize=8)
 def survey_of(ground: Ground, settings: EvaluationSettings, shape: tuple[int, int]) -> Survey:
-    """Return the survey for images of ``shape``, height and width: made once."""
+    """Return the survey for images of ``shape`` (height, width); repeated calls share it."""
     return Survey(ground.scaled(shape[1], shape[0]), settings)
 
 
@@ -221,7 +221,7 @@ class _Line(NamedTuple):
 
     pixels: Pixels
     borders: list[float]
-    """Metres, one more than pixels."""
+    """``(n + 1)`` metres along the line: the ends of its pixels."""
 
 
 Runs = list[tuple[int, int]]
@@ -229,7 +229,7 @@ Runs = list[tuple[int, int]]
 
 
 def _runs(flags: Plane, ends: Sums) -> list[Runs]:
-    """Return the stretches of set pixels on each line; ``ends`` are the places after its last."""
+    """Return each line's stretches of set flags; ``ends`` are the positions after its last one."""
     padded = np.concatenate([[0], flags, [0]])
     changed = np.asarray(padded[1:] != padded[:-1])
     changed[ends[:-1]] = True  # a stretch ends with its line
@@ -260,10 +260,10 @@ def _join_runs(runs: Runs, borders: list[float], gap: float) -> Runs:
 def _sides(
     runs: Runs, labelled: Runs, borders: list[float], middle: float
 ) -> tuple[float, float, float]:
-    """Return the left and the right end of the road nearest to a place, and its middle, in metres.
+    """Return the left end, right end and middle of the road nearest to ``middle``, in metres.
 
-    An end beyond which nothing is labelled is NaN. Without road both ends are NaN, and the middle
-    is the place.
+    An end beyond which nothing is labelled is NaN. Without road both ends are NaN, and
+    ``middle`` is returned.
     """
     best, far = None, math.inf
     for start, stop in _join_runs(runs, borders, GAP):
@@ -281,7 +281,7 @@ def _sides(
 
 
 def _free(runs: Runs, start: int, cap: float, borders: list[float], nothing: float) -> float:
-    """Return the metres where the road ahead of a pixel ends, at most ``cap``; else ``nothing``."""
+    """Return the metres to the end of the road at ``start``, at most ``cap``; else ``nothing``."""
     for first, stop in _join_runs(runs, borders, GAP_AHEAD):
         if first <= start < stop:
             return min(borders[stop], cap)

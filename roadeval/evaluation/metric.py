@@ -32,32 +32,32 @@ class Metric:
     formula: str
     """Formula in ``TP``, ``TN``, ``FP``, ``FN`` and ``N``."""
     function: Callable[[Counts], float]
-    """Computes it from a frame's counts, or elementwise if each count is an array; NaN if it is
-    undefined, see `ratio`."""
+    """Computes the metric from the counts of a frame, or elementwise from arrays of counts; NaN if
+    it is undefined, see `ratio`."""
     higher_is_better: bool
     """The direction of improvement."""
     order: int
-    """Its place among the columns; the paper's metrics bear their equations' numbers."""
+    """Position among the columns; for a metric of the paper, the number of its equation."""
     rank: int = 10
-    """Its place where people read it, the lowest first; equal ones are ranked by ``order``."""
+    """Position where people read it, the lowest first; equal ranks are sorted by ``order``."""
     meaning: str = ""
     """Plain words for what it counts; empty if the title says it."""
     unit: str = "fraction"
     """Unit of the value in tables."""
     shown: Shown = Shown.EVERYWHERE
-    """Places where people see it; a mirror of another, as ``TPR = 1 - FNR``, is in files only."""
+    """Places where people see it; a complement, such as ``TPR = 1 - FNR``, is in files only."""
     tabled: bool = True
-    """Whether it is a column of the tables; if not, only totals have it, and results that were made
+    """Whether it is a column of the tables. If not, it is in the totals only, and results from
     before it was added can still be read."""
 
     @property
     def in_words(self) -> str:
-        """Its meaning, or else its title."""
+        """The meaning, or the title if ``meaning`` is empty."""
         return self.meaning or self.title
 
 
 def ratio(part: int, total: int) -> float:
-    """Divide; a ratio with denominator 0 is undefined: NaN, never 0 or 1."""
+    """Return ``part / total``; NaN if ``total`` is 0, never 0 or 1."""
     try:
         return part / total  # for arrays, NumPy gives NaN for 0 / 0
     except ZeroDivisionError:

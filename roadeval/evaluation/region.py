@@ -31,10 +31,10 @@ class Region(NamedTuple):
     """A region, or several that are computed together."""
 
     titles: Mapping[str, str] | Callable[[Collection[str], int], Mapping[str, str]]
-    """A title for people by name, which is a value of the column ``region``; in order.
+    """Titles for people, in order, by name; the column ``region`` of the tables holds the names.
 
-    If titles depend on the drive, it is a function that returns the titles of some names, given
-    the images' height in pixels, or 0 if it is not known.
+    If titles depend on the drive, this is a function. It takes names and the height of the images
+    in pixels, 0 if unknown, and returns the titles of these names.
     """
     order: int
     """Its place among the regions."""
@@ -42,25 +42,25 @@ class Region(NamedTuple):
     """Computes the regions that a frame has, ``(H, words)`` each, by name."""
 
     def titles_of(self, names: Collection[str], height: int = 0) -> Mapping[str, str]:
-        """Return the titles of those names that it has, in order."""
+        """Return titles by name, in order, without the names that are not of this region."""
         if callable(self.titles):
             return self.titles(names, height)
         return {name: title for name, title in self.titles.items() if name in names}
 
 
 def grow(bits: Bits, reach: Reach, truth: TruthBits) -> Bits:
-    """Dilate a mask of the truth's shape by an element."""
+    """Return a mask, ``(H, words)``, dilated by a structuring element."""
     grown: Bits = KERNELS.dilate(bits, reach, truth.shape[1])
     return grown
 
 
 @lru_cache(maxsize=8)
 def square(radius: int) -> Reach:
-    """Return the element of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
+    """Return the square of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
     return np.full(radius + 1, radius)
 
 
 @lru_cache(maxsize=8)
 def disk(radius: int) -> Reach:
-    """Return the element of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
+    """Return the disk of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
     return np.array([isqrt(radius**2 - row**2) for row in range(radius + 1)])

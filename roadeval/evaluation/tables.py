@@ -130,7 +130,7 @@ def as_trees(sums: pd.DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def over_cameras(sums: pd.DataFrame) -> pd.DataFrame:
-    """Return the totals of all cameras from `totals` by camera: means are of the cameras' means."""
+    """Sum up `totals` by camera over all cameras; a mean is the mean of the cameras' means."""
     by_mask = sums.groupby(MASK, sort=False, observed=True)
     undefined = [f"undefined_{name}" for name in metrics.ALL]
     added = by_mask[["frames", *COUNTS, "N", *undefined]].sum()
@@ -139,10 +139,10 @@ def over_cameras(sums: pd.DataFrame) -> pd.DataFrame:
 
 
 def windows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
-    """Cut each camera's frames into windows of ``size`` that follow each other.
+    """Return the rows of ``windows.csv``: each camera's frames in windows of ``size``.
 
-    Returned are the rows of ``windows.csv``, by window and then mask. Frames count if any of the
-    masks is evaluated there; the last window may have fewer than ``size`` frames.
+    A frame counts if any mask is evaluated on it; the last window may have fewer frames. Rows are
+    sorted by window, then by mask.
     """
     rank = group_rows(frames, KEY)["frame"].rank("dense").astype(np.int64)
     cut = frames.assign(window=(rank - 1) // size)
@@ -229,7 +229,7 @@ def scene_ns(stamps: pd.Series[int]) -> int:
 
 
 def near_ns(stamps: pd.Series[int] | Sums) -> int:
-    """Return the least time between frames apart: a 30th of the drive, at most 1 second."""
+    """Return the least time between non-neighbours: a 30th of the drive, at most 1 second."""
     return min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
 
 
@@ -256,7 +256,7 @@ def most_changed_frames(
 ) -> pd.DataFrame:
     """Return the rows whose ``change`` is the greatest rise (``harmed``) or the greatest fall.
 
-    Frames that do not rise, or fall, are left out; so are neighbours, as in `worst`, also those of
+    Frames without such a change are left out. So are neighbours, as in `worst`, and neighbours of
     the stamps ``besides``.
     """
     rise = (1 if harmed else -1) * pairs["change"].to_numpy()
@@ -268,7 +268,7 @@ def most_changed_frames(
 def separate(
     stamps: Sums, ranked: Sums, count: int, apart_ns: int | None = None, besides: Sequence[int] = ()
 ) -> Sums:
-    """Return the first ``count`` places of a ranking that are not neighbours of an earlier one."""
+    """Return the first ``count`` ranked places that are not neighbours of an earlier one."""
     if apart_ns is None:
         apart_ns = near_ns(stamps)
     places: list[int] = []
@@ -284,7 +284,7 @@ def separate(
 
 
 def spread(stamps: Sums, ranked: Sums, count: int, besides: Sequence[int] = ()) -> Sums:
-    """Return ``count`` places of a ranking as `separate` does, nearer ones if there are too few."""
+    """Return ``count`` places as `separate` does; if they are too few, with less time between."""
     apart = near_ns(stamps)
     while True:
         places = separate(stamps, ranked, count, apart, besides)
@@ -296,8 +296,8 @@ def spread(stamps: Sums, ranked: Sums, count: int, besides: Sequence[int] = ()) 
 def changes(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
     """Subtract two variants' final masks frame by frame, ``treated`` minus ``control``.
 
-    Returned are the treated variant's rows with ``change``, of `TESTED`, and ``wrong``, the net
-    change of wrong pixels; columns of the control end in ``_base``.
+    The result has the treated variant's rows, ``change`` of `TESTED`, and ``wrong``, the change of
+    the number of wrong pixels; columns of the control end in ``_base``.
     """
     last = finals(frames)
     pairs = pair_rows(only(last, variant=control), only(last, variant=treated), [*KEY, "frame"])
@@ -328,7 +328,7 @@ def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
 
 
 def _errors(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return a variant's ERR by frame, a column for each stage, in the order they ran."""
+    """Return a variant's ERR: a row for each frame, a column for each stage as they ran."""
     errors = rows.assign(stage=rows["stage"].astype(str))
     by_stage = errors.pivot_table(TESTED, "frame", "stage", "first", dropna=False)
     return by_stage[values_of(rows, "stage")].rename_axis(None, axis=1)
@@ -349,13 +349,13 @@ def by_region(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_class(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the part of each class in the errors of one mask, from rows of ``classes``.
+    """Return each class's share of the errors of one mask, from rows of ``classes``.
 
-    The classes' names for people are the index. Columns are ``truth``; ``pixels``, the share of all
-    pixels that count, ``of_other``, that of non-road, and ``road``, the share of its own pixels
-    that is called road; ``false``, its share of the false road, and ``missed``, the share of the
+    The classes' names for people are the index. Columns are ``truth``; ``pixels`` and ``of_other``,
+    the class's share of all counted pixels and of the non-road pixels; ``road``, the share of its
+    pixels that is called road; ``false``, its share of the false road; ``missed``, the share of the
     missed road that lies beside it; and ``worst``, frames of the first drive. Shares are means over
-    drives; the greatest part of the false road comes first.
+    drives. Rows with more of the false road come first.
     """
     texts, pixels = rows["name"].astype(str), rows["pixels"]
     is_road, is_other = rows["truth"] == "road", rows["truth"] == "other"

@@ -109,6 +109,11 @@ def test_a_bad_key_or_value_is_named(tmp_path, text, message):
         ({"training": {"model": "a\0b"}}, "zero byte"),
         ({"output": {"save": "\0"}}, "zero byte"),
         ({"masks": {"m": {"path": "a\0"}}}, "zero byte|must name a log"),
+        ({"labels": {"road": ["a\0"]}}, r"^`labels\.road`: holds a zero byte"),
+        ({"labels": {"road": ["\udcff"]}}, r"^`labels\.road`: its bytes are not UTF-8"),
+        ({"output": {"labels": {"\udcff": "a"}}}, r"^`output\.labels\.\\udcff`: its bytes"),
+        ({"cameras": [{}]}, r"^\[\[cameras\]\]: image must name its topic$"),
+        ({"cameras": [{"name": "left"}]}, r"^\[\[cameras\]\] left: image must name its topic$"),
         *(({"variants": {name: {}}}, "reserved") for name in sorted(RESERVED)),
         *(
             ({"variants": {name: {}}}, "letters, digits")
@@ -151,7 +156,7 @@ def test_the_two_variants_differ_by_the_filter_alone():
 
 @pytest.mark.parametrize("chain", [["post"], ["shadow", "post"], ["exposure", "post"]])
 def test_a_chain_without_a_mask_cannot_run(chain):
-    wrong = "has no stage before post that makes a road mask"
+    wrong = "makes a road mask for post"
     with pytest.raises(ConfigError, match=wrong):
         configure({"chain": chain}).resolved()
     own = {"variants": {"own": {"chain": chain}}}
@@ -399,7 +404,7 @@ def test_of_several_cameras_the_topic_of_the_images_tells_which(tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (yaml.dump({"cam0": {**FRONT, "camera_model": "omni"}}), "cam0 is of the model omni"),
+        (yaml.dump({"cam0": {**FRONT, "camera_model": "omni"}}), "cam0 has the camera model omni"),
         (OST.replace("-0.3", ".nan"), "ground.distortion: item 1"),
         (OST.replace("560.5", "-1"), "ground.focal: item 1"),
         (OST.replace("560.5", "fx"), "no camera as ROS's camera_calibration"),

@@ -60,7 +60,7 @@ EMPTY = a_result("empty", a_drive({POST: []}))
     ("base", "new", "why"),
     [
         (a_side("a", [10]), a_side("b", [30], digest="d2"), "a and b are of different drives"),
-        (a_side("a", [10]), a_side("b", [10], digest=None), "b does not say which log it is of"),
+        (a_side("a", [10]), a_side("b", [10], digest=None), "b does not say which log it is from"),
         (a_side("base", [10, 20]), LATE, "no evaluated frame and stage in common"),
         (EMPTY, a_side("there", [10] * 12), "empty: nothing was scored"),
         (a_side("there", [10] * 12), EMPTY, "empty: nothing was scored"),
@@ -245,6 +245,12 @@ def test_a_condition_is_judged_on_every_new_result():
 def test_a_condition_is_not_judged_by_a_handful_of_frames(text, why):
     found = compare([a_side("base", [10] * 40), a_side("new", [90] * 9)], SETTINGS)
     assert re.search(why, unjudged(found, text))
+
+
+def test_frames_of_several_drives_may_be_too_few():
+    fleets = [a_fleet(label, noisy(4)[:, :2]) for label in ("a", "b")]
+    why = unjudged(compare(fleets, SETTINGS), "post.filtered.ERR > 1pp")
+    assert "a and b have 8 evaluated frames in common, and 10 are needed; replay the same" in why
 
 
 def test_a_level_is_that_of_all_frames_of_the_new_result_whatever_the_base_has():

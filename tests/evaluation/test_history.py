@@ -151,6 +151,12 @@ def test_the_last_run_is_judged_against_the_mean_of_those_before():
     assert judged(rows, text, last=99) == judged(rows, text, last=11)
 
 
+def test_a_rate_that_did_not_change_was_the_same_before():
+    (unchanged,) = judged(rows_of(lambda run, drive: 0.0), "post.mine.ERR > +1pp")
+    assert (unchanged.value, unchanged.before) == (0, unchanged.after)
+    assert unchanged.after > 0
+
+
 def test_a_condition_on_what_is_not_there_is_not_judged():
     gone = rows_of(lambda run, drive: 0.0)
     gone = gone[(gone["run"] < 11) | (gone["drive"] == "a")]

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FALSE: Final = 0.05
-"""The share of the drives called changed that may be false, on average."""
+"""Mean share of the drives marked as changed that may be marked by chance."""
 FRAMES: Final = 5_000
 """Evaluated frames of a new result that are in memory together; one drive may have more."""
 _OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
@@ -83,14 +83,14 @@ class MaskChange:
     """Whether it is the variant's final mask."""
     drives: int
     frames: int
-    """Drives and frames that both have."""
+    """Number of drives, and of frames, that both results have."""
     base: Mapping[str, float]
     new: Mapping[str, float]
-    """Metrics: means over drives of the drives' means, each group of drives alike; ``pooled_*`` and
-    metrics of the overlap are computed from all pixels together. ``base`` is empty if nothing is
-    subtracted."""
+    """Metrics by name: means over drives of the drives' means, with equal weight for each group of
+    drives; ``pooled_*`` and metrics of the overlap are computed from the summed counts. ``base`` is
+    empty if there is no base."""
     difference: Mapping[str, Difference]
-    """New minus base by metric; empty if nothing is subtracted."""
+    """New minus base by metric; empty if there is no base."""
 
     @property
     def name(self) -> str:
@@ -155,7 +155,7 @@ class Comparison:
     results: tuple[ComparedResult, ...]
     """The base first."""
     changed_settings: Mapping[str, Mapping[str, tuple[Any, Any]]]
-    """The settings that differ from the base's, by new result: both values by name."""
+    """Settings that differ from the base's: both values, by label of the new result and by name."""
     changes: tuple[MaskChange, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
     levels: tuple[MaskChange, ...]
@@ -186,9 +186,9 @@ def variants_as_sides(
 ) -> list[Side]:
     """Return variants of one result as results to compare, the base first.
 
-    ``variants`` are all that it has, ``chosen`` those to compare, in order. By default they are all
-    but the baseline, ``unfiltered`` first; a single one is compared with the baseline. A
-    `ComparisonError` if a variant is not there, or fewer than two are.
+    ``variants`` are the names of all its variants, ``chosen`` of those to compare, in order. By
+    default all but the baseline are compared, ``unfiltered`` first; a single one is compared with
+    the baseline. A `ComparisonError` if a variant is missing, or there are fewer than two.
     """
     pipelines = sorted((n for n in variants if n != BASELINE), key=lambda name: name != UNFILTERED)
     if len(pipelines) == 1:
@@ -199,10 +199,10 @@ def variants_as_sides(
             choice = f"{likely(name, variants)}there are {', '.join(variants)}"
             raise ComparisonError(f"no variant {name}", where=result.label, remedy=choice)
     if len(names) < 2:
-        lone = f"{names[0]} alone" if names else "no variant"
+        problem = f"{names[0]} alone cannot be compared" if names else "no variant can be compared"
         there = ", ".join(variants) or "it has none"
         remedy = f"name two of its variants with --variant ({there}), or a second result"
-        raise ComparisonError(f"{lone} cannot be compared", where=result.label, remedy=remedy)
+        raise ComparisonError(problem, where=result.label, remedy=remedy)
     return [replace(result, label=name, variants={name: name}) for name in names]
 
 
@@ -211,8 +211,8 @@ def compare(
 ) -> Comparison:
     """Compare results with the first of them.
 
-    ``across_variants`` says that each side is one variant of the same result, to be matched with
-    another one. A `ComparisonError` if a result has nothing to compare, or two have no drive or no
+    ``across_variants`` says that the sides are variants of one result, to be compared with each
+    other. A `ComparisonError` if a result has nothing to compare, or two have no drive or no
     frame in common.
     """
     for side in sides:
@@ -230,7 +230,7 @@ def compare(
         if not matched:
             for side in (new, old):
                 if any(drive.digest is None for drive in side.scored):
-                    problem = f"{side.label} does not say which log it is of"
+                    problem = f"{side.label} does not say which log it is from"
                     raise ComparisonError(f"{problem}, so nothing can be compared")
             raise ComparisonError(
                 f"{old.label} and {new.label} are of different drives: a comparison would mix "
@@ -335,7 +335,7 @@ def _compare_two(
 
 
 def _class_changes(label: str, base: pd.DataFrame, new: pd.DataFrame) -> Iterator[ClassChange]:
-    """Yield the shares of the false road that are at least a hundredth; one may lack the names."""
+    """Yield the classes with at least 1 % of the false road; one side may lack their names."""
     both = tables.concatenate([base.assign(side="base"), new.assign(side="new")])
     names = both["name"].astype(str).replace("", None)
     both["name"] = names.fillna(names.groupby(both["class"]).transform("last")).fillna("")
@@ -366,7 +366,7 @@ def _compared_result(side: Side, frames: int, relabelled: int = 0) -> ComparedRe
 
 
 def _groups(new: Side, matched: Sequence[Pair]) -> dict[tuple[str, str], str]:
-    """Return by drive and camera the group that counts as one; copies of a log are one."""
+    """Return the group by drive and camera of ``new``; copies of a log are one group."""
     firsts = {drive.digest: drive.drive for drive in reversed(new.scored)}
     groups = {drive.key: drive.group or firsts[drive.digest] for drive in new.scored}
     of_base = {drive.key: old.group for old, drive in matched if old.group and not drive.group}
@@ -418,7 +418,7 @@ def by_drive(
 
 
 def _means(drives: pd.DataFrame, names: Sequence[str]) -> list[float]:
-    """Average drives as their differences are, so that these lie between two rates."""
+    """Return each column's mean over groups of the groups' means, as differences are averaged."""
     return drives.groupby("group")[[*names]].mean().mean().tolist()
 
 
@@ -525,7 +525,7 @@ def _warnings(
     frames: Mapping[str, int],
     changed: Mapping[str, tuple[Any, Any]],
 ) -> Iterator[str]:
-    """Yield what was left out, and what makes the two less comparable than they look."""
+    """Yield sentences on frames left out, and on settings and truths that differ."""
     base, new = labels
     if without_frames:
         yield pairing.left_out(without_frames, new, f"no evaluated frame in common with {base}")
@@ -557,7 +557,7 @@ def _warnings(
 
 
 def changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
-    """Return both values of the settings that both know and that differ."""
+    """Return the settings that both results have and that differ: both values by name."""
     changed: dict[str, tuple[Any, Any]] = {}
     for base, new in pairs:
         for name in (name for name in base.settings if name in new.settings):
@@ -567,7 +567,7 @@ def changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
 
 
 def _differences(name: str, value: Any, other: Any) -> Iterator[tuple[str, tuple[Any, Any]]]:
-    """Yield the name and both values of a setting that differs, in a table of each that does."""
+    """Yield name and both values of a setting, or of each key of a table, if they differ."""
     if isinstance(value, Mapping) and isinstance(other, Mapping):
         for key in {**value, **other}:
             yield from _differences(f"{name}.{key}", value.get(key), other.get(key))

@@ -11,13 +11,13 @@ A condition is a quantity, an operator and a limit, and may ask for certainty::
                  (of all pixels together, with or without pooled_)
 
 A change is computed on the frames that both results evaluated, a level on all frames of the new
-result. If there are several drives, both are means over drives, each group of drives alike. Nothing
-is ever executed.
+result. If there are several drives, both are means over drives, with equal weight for each group of
+drives. A condition is only parsed, never executed.
 
 With ``surely`` the whole interval of the change must lie beyond the limit. The interval allows for
 chance in the frames, not for the training's seed, so the limit must leave room for that: two of 20
 ordered pairs of five seeds on a drive of CamVid (0006R0) exceed +0.5 pp, and none exceeds it
-surely; without room, at +0 pp, seven still do. Only the mean change of ACC, ERR, FNR and FPR has an
+surely; without room, seven exceed 0 surely. Only the mean change of ACC, ERR, FNR and FPR has an
 interval.
 
 A condition that cannot be judged never counts as kept. It cannot be judged if a rate is undefined,
@@ -90,7 +90,7 @@ class Condition:
                 "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'; a 'surely' "
                 "after pp means the whole interval"
             )
-        stage, variant, rate, sign, number, unit, surely = match.groups()
+        stage, variant, rate, comparator, number, unit, surely = match.groups()
         if rate not in QUANTITIES:
             remedy = f"there are {', '.join(QUANTITIES)}"
             raise ConditionError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
@@ -104,7 +104,7 @@ class Condition:
             remedy = f"'surely' goes with {', '.join(COMPARED)}"
             raise ConditionError(f"{rate} has no interval", where=repr(text), remedy=remedy)
         limit = float(number), unit == "pp", bool(surely)
-        return cls(" ".join(text.split()), stage, variant, rate, sign, *limit)
+        return cls(" ".join(text.split()), stage, variant, rate, comparator, *limit)
 
     def judge(self, mask: MaskChange) -> Judgement:
         """Judge the condition on the change of the mask that it names."""
@@ -126,7 +126,7 @@ class Condition:
         return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
 
     def not_judged(self, result: str, because: str) -> Judgement:
-        """Return the judgement that it could not be judged on a result, and why."""
+        """Return a judgement without a verdict, with the reason."""
         why = Sentence("{}: not judged in {}, because {}", self.text, result, because)
         nan = math.nan
         return Judgement(self, result, 0, nan, nan, nan, None, None, None, why)
@@ -152,7 +152,7 @@ class Judgement:
     holds: bool | None
     """None if it could not be judged."""
     why: str = ""
-    """The reason why not."""
+    """The reason why it could not be judged; else empty."""
 
 
 def judge(
@@ -198,7 +198,7 @@ def _why_not_judged(
             "the labels'; replay both with the same truth, or limit in %"
         )
     unit, common, smaller = "evaluated frames", mask.frames, min(base.frames, new.frames)
-    if min(base.scored, new.scored) > 1:
+    if mask.frames >= least and min(base.scored, new.scored) > 1:
         unit, common, smaller = "drives", mask.drives, min(base.scored, new.scored)
     if mask.frames < least:
         few = f"and {least} are needed"

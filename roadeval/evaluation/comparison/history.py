@@ -1,7 +1,7 @@
 """Many runs over the same drives: which rate changed in which run.
 
 A run is compared with the runs before it on the drives that both have. A drive whose log, frames or
-truth changed is another drive from then on: its numbers are of other pixels.
+truth changed is another drive from then on: its numbers describe other pixels.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Line(NamedTuple):
     stage: str
     """The stage of the final mask."""
     kind: str
-    """``all`` pixels, a ``region``, a ``class``, or a tag: its column if that is its name, too."""
+    """``all``, ``region``, ``class``, or a tag's name; its column if that is one of the three."""
     part: str
     """The region, the class, or the value of the tag."""
     rate: str
@@ -51,7 +51,7 @@ class Line(NamedTuple):
     rates: Floats
     """``(T,)`` mean over the drives of each run; NaN where it has none."""
     levels: Floats
-    """``(T,)`` the same as if every run had the drives of the last one."""
+    """``(T,)`` the mean as if every run had the drives of the last run."""
     ends: Floats
     """``(2, T)`` ends of the interval of each run's mean change over its drives, around the level;
     only for `TESTED` of all pixels, else empty; NaN with too few drives."""
@@ -75,9 +75,9 @@ class LineChange(NamedTuple):
 
 
 def number_pixels(rows: pd.DataFrame) -> pd.Series[int]:
-    """Return a number for each row: rows of the same pixels of a drive have the same, see `PIXELS`.
+    """Return a number for each row, equal for rows of the same pixels of a drive, see `PIXELS`.
 
-    It depends on the row alone. Two others are equal by chance once in 2^64 pairs.
+    It is a hash of the row: two rows of different pixels have the same once in 2^64 pairs.
     """
     from pandas.util import hash_pandas_object
 
@@ -182,7 +182,7 @@ def _ends(
 
 
 def _stretches(there: Flags) -> Iterator[Sums]:
-    """Yield positions of runs in groups: each run shares a drive with an earlier one of its group.
+    """Yield groups of runs' positions: a run shares a drive with an earlier run of its group.
 
     ``there`` is ``(T, D)``. Runs without any drive are left out.
     """
@@ -199,11 +199,11 @@ def _stretches(there: Flags) -> Iterator[Sums]:
 
 
 Within = Callable[[Line, Sequence[int], Sequence[int]], Difference]
-"""Returns the difference of a line within its only drive, from some runs to others, over frames."""
+"""Returns a line's difference over the frames of its only drive, from some runs to others."""
 
 
 def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> list[LineChange]:
-    """Return the steps in the order of their runs; those of ERR of masks are corrected together."""
+    """Return the steps in the order of their runs; p-values of masks' ERR are corrected."""
     changes = []
     for line in lines:
         for step in line.steps:
@@ -222,10 +222,10 @@ def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> li
 def _difference(
     line: Line, before: range, after: range, confidence: float, within: Within
 ) -> tuple[Difference, pd.DataFrame]:
-    """Return the change over the drives that are in some of both runs, and these drives."""
+    """Return the change over the drives that have runs before and after, and these drives."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a drive that is in none of the runs
-        # A run that stands out says nothing of the level beside it.
+        warnings.simplefilter("ignore", RuntimeWarning)  # some drive may be in no run
+        # An outlier tells nothing about the level of the runs beside it.
         out = {step.run for step in line.steps if step.kind == "outlier"}
         sides = [[run for run in runs if run not in out] or [*runs] for runs in (before, after)]
         old, new = (np.nanmean(line.drive_rates[runs], axis=0) for runs in sides)
@@ -249,9 +249,9 @@ def judge_last(
     settings: EvaluationSettings,
     within: Within,
 ) -> Iterator[Judgement]:
-    """Judge each condition on the last run, against the mean of so many ``earlier`` runs.
+    """Judge each condition on the last run, against the mean of ``earlier`` runs before it.
 
-    Its interval is widened by the noise of a run.
+    The interval of the change is widened by the noise of a run.
     """
     label = "the last run"
     masks = {
@@ -274,10 +274,11 @@ def judge_last(
             continue
         if difference.low is not None and difference.high is not None:
             mean, noise = difference.mean, 2 * line.noise * math.sqrt(1 + 1 / len(runs[0]))
-            low, high = (math.hypot(mean - end, noise) for end in (difference.low, difference.high))
-            difference = replace(difference, low=mean - low, high=mean + high)
-        base, new = difference.mean and line.rates[-1] - difference.mean, line.rates[-1]
+            below, above = (math.hypot(mean - b, noise) for b in (difference.low, difference.high))
+            difference = replace(difference, low=mean - below, high=mean + above)
+        new = float(line.rates[-1])
+        base = new - difference.mean
         rate = condition.rate
         about = label, line.variant, line.stage, True, len(rows), settings.least_frames
-        mask = MaskChange(*about, {rate: base}, {rate: float(new)}, {rate: difference})
+        mask = MaskChange(*about, {rate: base}, {rate: new}, {rate: difference})
         yield condition.judge(mask)

@@ -88,18 +88,18 @@ NAMED: Final = 5
 """Greatest number of drives named as left out, and of frames named as changed or disagreeing."""
 
 
-def left_out(names: Sequence[str], of: str, why: str) -> str:
-    """Return the sentence that drives are left out of a result, and why."""
+def left_out(names: Sequence[str], result: str, why: str) -> str:
+    """Return a sentence that names the drives left out of a result, and the reason."""
     drives = "1 drive is" if len(names) == 1 else f"{len(names)} drives are"
-    return f"{drives} left out of {of} ({why}): {first_of(names, NAMED)}"
+    return f"{drives} left out of {result} ({why}): {first_of(names, NAMED)}"
 
 
 def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
     """Match the drives of two results, each camera by the drive's name, else by its log.
 
-    One name with two different logs is no match: the difference would be the scene's. Returned are
-    the drives that both have scored, in the base's order, and a sentence for each result and reason
-    on the others.
+    Drives with one name but different logs do not match: the scene would make the difference.
+    Return the drives that both have scored, in the base's order, and sentences on all others, one
+    for each result and reason.
     """
     by_key = {drive.key: drive for drive in new.drives}
     names = {drive.key for drive in base.drives}
@@ -134,7 +134,7 @@ def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[str]]:
 
 
 def one_drive(sides: Sequence[Side]) -> list[Side] | None:
-    """Return the results with the only drive that is compared; None unless it is exactly one."""
+    """Return the results with the one drive that is compared; None if there are none or several."""
     base, *others = sides
     pairs = [match_drives(base, new)[0] for new in others]
     firsts = {matched[0][0].key for matched in pairs if matched}
@@ -169,12 +169,12 @@ def truth_differs(base: pd.DataFrame, new: pd.DataFrame) -> int:
 
 
 def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -> pd.DataFrame:
-    """Return pairs of masks by region, with the counts there, for the regions that both share.
+    """Return pairs of masks by region, with their counts, for the regions that both results have.
 
     ``pairs`` are final masks, as of `common_masks`; ``base`` and ``new`` are rows of ``regions``. A
-    region that is not the same pixels in both, as the shadow that another filter found, is left
-    out: its ERR would describe other places. Pixels are taken for the same if each frame of a drive
-    has as many of them, and as many of road. Frames that label none of them are left out, too.
+    region that has other pixels in each result, such as the shadow that another filter found, is
+    left out: its ERR would describe other places. Pixels count as the same if each frame of a drive
+    has equal numbers of them, and of road among them. Frames that label none are left out, too.
     """
     numbered = pairs[[*KEY, "variant", "stage", "stage_base", "frame", "frame_base"]]
     numbered = numbered.assign(pair=np.arange(len(pairs)))
@@ -188,7 +188,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
         words = {n: tables.word_type(numbered[n], rows[n]) for n in (*by, f"stage{end}")}
         rows = numbered.astype(words).merge(rows.astype({**words, "region": regions}))
         sides.append(rows[[*on, *COUNTS]])
-    del rows  # as the sides are: of a long drive they are most of the memory
+    del rows  # released like the sides: they take most of the memory of a long drive
     both = sides.pop(0).merge(
         sides.pop(), on=on, how="outer", suffixes=("_base", ""), indicator="in"
     )
@@ -251,7 +251,7 @@ def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
 def disagreements(
     table: pd.DataFrame, pairs: pd.DataFrame, base: str, new: str
 ) -> Iterator[Disagreement]:
-    """Yield frames on which two variants of a run disagree most, one of neighbours only.
+    """Yield frames on which two variants of a run disagree most, one of several neighbours.
 
     ``table`` has the rows of ``disagreements``; only the frames of ``pairs`` are considered.
     """

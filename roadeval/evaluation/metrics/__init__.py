@@ -1,9 +1,9 @@
 """The metrics.
 
-To add one, add a file with ``METRICS``: each becomes a rate of screens, graphs and reports, and if
-it is tabled a column of the tables and a series of the recording, as its attributes say. Another
-package adds one by an entry point of the group ``roadeval.metrics``; it is never tabled, so results
-have the same columns everywhere.
+To add metrics, add a file with ``METRICS``. Screens, graphs and reports then show them as their
+attributes say; those with ``tabled`` are also columns of the tables and series of the recording.
+Another package adds one by an entry point of the group ``roadeval.metrics``; it is never tabled, so
+results have the same columns everywhere.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ ALL: Final[Mapping[str, Metric]] = by_name(
 METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}
 """The columns of the tables, in their order."""
 TESTED: Final = "ERR"
-"""The rate whose differences are findings. Differences of final masks against one base are a
-family, and corrected for their number; other rates and stages explain a finding."""
+"""The rate that is tested. Its differences between final masks and one base are a family, corrected
+for their number; other rates and stages only explain them."""
 UNTABLED: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}
-"""Metrics beyond the paper's, which are computed with the totals."""
+"""Metrics that are in the totals only: the paper does not have them."""
 
 
 def _shown(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
@@ -48,9 +48,9 @@ def _shown(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
 SHORT: Final = _shown(METRICS, Shown.EVERYWHERE)
 """The rates of short tables, lists, graphs and charts."""
 FULL: Final = _shown(METRICS, Shown.IN_FULL)
-"""The rates of tables that show all of a mask."""
+"""The rates of tables that show all rates of a mask."""
 SHORT_UNTABLED: Final = _shown(UNTABLED, Shown.EVERYWHERE)
-"""The metrics without a column in tables that are shown beside `SHORT`."""
+"""The metrics of `UNTABLED` that are shown beside `SHORT`."""
 COMPARED: Final = tuple(name for name in METRICS if name in FULL)
 """The metrics that have paired differences, in the order of the columns."""
 
@@ -61,10 +61,10 @@ def of(counts: Counts) -> dict[str, float]:
 
 
 def table(counts: Sums, metrics: Mapping[str, Metric] = METRICS) -> Floats:
-    """Compute metrics of many frames at once, exactly as `of` does.
+    """Compute metrics of many frames at once, exactly as `of` does: ``(n, m)`` float64.
 
-    ``counts`` are ``(n, 4)``: TP, TN, FP, FN. Returned is ``(n, m)`` float64 in the order of
-    ``metrics``; NaN if a metric is undefined.
+    ``counts`` are ``(n, 4)``: TP, TN, FP, FN. Columns are in the order of ``metrics``; NaN if a
+    metric is undefined.
     """
     columns = Counts(*counts.T)
     with np.errstate(invalid="ignore"):

@@ -1,4 +1,4 @@
-"""The rates of a mask: the paper's six (Eq. 24-29), and four of today (IoU, mIoU, F1, precision).
+"""The rates of a mask: the paper's six (Eq. 24-29), and IoU, mIoU, F1, precision.
 
 IoU is Jaccard's index of mask and truth [1]_, mIoU its mean over road and non-road; F1 the
 harmonic mean of precision and TPR [2]_ [3]_.

@@ -1,6 +1,6 @@
 """The regions: sets of pixels that are counted apart, to show where the errors are.
 
-To add one, add a file with ``REGIONS``: each becomes rows of ``regions.csv`` and of the report.
+To add regions, add a file with ``REGIONS``; ``regions.csv`` and the report then have their rows.
 Another package adds one by an entry point of the group ``roadeval.regions``.
 """
 
@@ -18,14 +18,14 @@ from roadeval.evaluation.region import LabelledFrame, Region
 from roadeval.runtime.discovery import collect, installed
 
 ALL: Final = "all"
-"""The name of the whole frame in sums by region."""
+"""The name of the whole frame in tables by region."""
 HALVES: Final = ("boundary", "interior")
 """Regions that together are the whole frame."""
 
 
 @cache
 def regions() -> tuple[Region, ...]:
-    """Return the regions in their order, those of other packages included."""
+    """Return the regions in their order, with the regions of other packages."""
     built_in = chain(*collect(sys.modules[__name__], "REGIONS"))
     others = installed("regions", Region, RoadevalError)
     return tuple(sorted([*built_in, *others], key=lambda region: region.order))

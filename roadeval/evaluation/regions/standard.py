@@ -22,9 +22,9 @@ SHADOW_TITLES: Final = {
 
 
 def detected_regions(labelled: LabelledFrame) -> dict[str, Bits]:
-    """Return the regions that stages computed.
+    """Return the regions that stages computed, ``(H, words)`` each, by name.
 
-    Those of the first variant hold for all, so that variants are compared on the same pixels.
+    The first variant that has a region sets it for all, so all are compared on the same pixels.
     """
     masks: dict[str, Packed] = {}
     for variant in labelled.variants:
@@ -35,7 +35,7 @@ def detected_regions(labelled: LabelledFrame) -> dict[str, Bits]:
 
 
 def true_shadow(labelled: LabelledFrame) -> dict[str, Bits]:
-    """Return the truly shadowed pixels, if there is a truth of shadow."""
+    """Return the pixels in shadow, by the truth of shadow; empty if there is none."""
     shadow = labelled.frame.shadow_truth
     if shadow is None:
         return {}
@@ -45,9 +45,8 @@ def true_shadow(labelled: LabelledFrame) -> dict[str, Bits]:
 def boundary(truth: TruthBits, width: int) -> Bits:
     """Mark the pixels within ``width`` of the edge between road and non-road, ``(H, words)``.
 
-    A pixel belongs to it if the square of side ``2 * width + 1`` around it holds both road and
-    non-road of the truth. An ignored pixel is neither, so there is no edge between road and ignored
-    pixels.
+    A pixel is marked if the square of side ``2 * width + 1`` around it holds both road and non-road
+    of the truth. An ignored pixel is neither, so road and ignored pixels have no edge between them.
     """
     element = square(width)
     return grow(truth.road, element, truth) & grow(truth.other, element, truth)
@@ -74,7 +73,7 @@ def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
 
 
 def titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
-    """Return the titles of the bands of rows, which number them if the ``height`` is 0."""
+    """Return the titles of the bands: their rows, or their numbers if ``height`` is 0."""
     bands = [name for name in names if name.startswith("band_")]
     titles = {}
     for place, name in enumerate(bands):
@@ -86,7 +85,7 @@ def titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
 
 
 def titles_of_distances(names: Collection[str], _height: int) -> dict[str, str]:
-    """Return the titles of the distances ahead."""
+    """Return the titles of the regions by distance."""
     bands = [match for name in names if (match := _DISTANCE.fullmatch(name))]
     titles = {match[0]: f"{match[1]} to {match[2]} m ahead" for match in bands}
     if UNPLACED in names:

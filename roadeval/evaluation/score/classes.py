@@ -1,4 +1,4 @@
-"""The classes of the truth: which are called road, and beside which road is missed."""
+"""The classes of the truth: how much of each is called road, and the missed road beside it."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from roadeval.data.arrays import Sums
 from roadeval.evaluation.tables import separate
 
 BESIDE: Final = 75
-"""Missed road lies beside a class within a 75th of the image's diagonal: 8 pixels of 480x360."""
+"""Missed road within a 75th of the diagonal lies beside a class: within 8 pixels at 480x360."""
 SHOWN: Final = 3
-"""Worst frames of a class."""
+"""Number of worst frames of a class that are named."""
 APART_NS: Final = 1_000_000_000
-"""The least time between them."""
+"""Least time between these frames."""
 
 
 def count_classes(classes: Classes, truth: Truth, masks: Mapping[str, Mask]) -> dict[str, Sums]:
     """Count each class in each mask: ``(256, 3)`` by the mask's name, a row for each code.
 
-    Columns are the pixels of the class; those that are called road; and the missed road beside it:
-    the road pixels outside the mask whose nearest non-road pixel is of the class, and lies within
-    `BESIDE`.
+    Columns are the pixels of the class; its pixels that are called road; and the missed road beside
+    it. These are road pixels outside the mask: their nearest non-road pixel lies within `BESIDE`
+    and has the class.
     """
     import cv2
 
@@ -59,13 +59,13 @@ def count_classes(classes: Classes, truth: Truth, masks: Mapping[str, Mask]) -> 
 
 
 class ClassSums:
-    """Sums of `count_classes` over a drive, and the frames in which each class costs most."""
+    """Sums of `count_classes` over a drive, and the frames with most errors on each class."""
 
     def __init__(self) -> None:
         self._sums = defaultdict[str, Sums](lambda: np.zeros((256, 4), np.int64))
-        """Columns as of `count_classes`, and the frames that have the class."""
+        """The columns of `count_classes`, and the number of frames that have the class."""
         self._worst = defaultdict[tuple[str, int, bool], list[tuple[int, Moment]]](list)
-        """Missed or false road and its frame, the worst first, by variant, code, and if missed."""
+        """Wrong pixels and their frame, most first, by variant, code, and if road is missed."""
 
     def add(self, moment: Moment, by_variant: Mapping[str, Sums]) -> None:
         """Add the counts of a frame."""
@@ -83,9 +83,9 @@ class ClassSums:
                     worst[:] = [ranked[place] for place in places]
 
     def rows(self, classes: Sequence[TruthClass]) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of ``classes``; none if classes tell no more than the truth itself.
+        """Yield the rows of ``classes``; none if road and non-road have one class each.
 
-        ``classes`` are in the order of codes. More than fit into codes are no classes, but objects.
+        ``classes`` are in the order of codes. If they are too many for codes, they are objects.
         """
         for variant, sums in self._sums.items():
             seen = [(label, code) for code, label in enumerate(classes) if sums[code, 3]]

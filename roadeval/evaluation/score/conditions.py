@@ -1,7 +1,7 @@
-"""Conditions of frames: light, sharpness, movement, and how the road lies. Cheap, without masks.
+"""Conditions of frames: light, sharpness, movement, and the road's shape.
 
-They are measured on the image and its truth, so that slices of frames with more errors can be named
-in words (`roadeval.evaluation.stats.slices`).
+They are measured on the image and its truth, without masks. Slices of frames with more errors are
+described by them (`roadeval.evaluation.stats.slices`).
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ QUANTITIES: Final[Mapping[str, str]] = {
 ACROSS: Final = 64
 """Width in pixels at which light and change are measured."""
 LINES: Final = 32
-"""Rows of a frame that are looked at for blur and curvature, about as many."""
+"""Approximate number of rows of a frame from which blur and curvature are computed."""
 LEAST_ROWS: Final = 6
-"""Rows with road that curvature needs."""
+"""Least number of rows with road for curvature."""
 FAR: Final = 4
-"""Pixels between the farther ones that blur compares."""
+"""Distance of the farther pixels that blur compares."""
 DIGITS: Final = 5
-"""Digits of a value behind the point."""
+"""Decimal places of a value."""
 
 
 def shrink(image: Rgb) -> Plane:
@@ -57,7 +57,7 @@ def shrink(image: Rgb) -> Plane:
 
 
 def blur(image: Rgb) -> float:
-    """Return how smooth an ``(H, W, 3)`` image is, see `QUANTITIES`; NaN if it has one colour."""
+    """Return how blurred an ``(H, W, 3)`` image is, see `QUANTITIES`; NaN if it has one colour."""
     rows = image[:: max(len(image) // LINES, 1), :, 1].astype(np.int16)
     if rows.shape[1] <= FAR:
         return math.nan
@@ -66,7 +66,7 @@ def blur(image: Rgb) -> float:
 
 
 def curvature(truth: Truth) -> float:
-    """Return how bent the road of an ``(H, W)`` truth is, see `QUANTITIES`; NaN in few rows."""
+    """Return how bent the road of an ``(H, W)`` truth is, see `QUANTITIES`; NaN if in few rows."""
     road = truth[:: max(len(truth) // LINES, 1)] == ROAD
     sizes = road.sum(axis=1)
     there = sizes > 0
@@ -78,10 +78,10 @@ def curvature(truth: Truth) -> float:
 
 
 def parts_of(result: FrameResult) -> Iterator[tuple[str, str | int, int, int]]:
-    """Yield variant and part of a frame's pixels, how many are wrong, and how many are labelled.
+    """Yield variant, part of the frame, and the numbers of wrong and of labelled pixels in it.
 
-    Parts of final masks are image rows, distances, sides, and classes, by their codes; of a class
-    it is how many are called road.
+    Parts are bands of image rows, distances, the left and right half, and classes by code. For a
+    class the number of pixels called road takes the place of the wrong ones.
     """
     for tally in {tally.variant: tally for tally in result.tallies}.values():
         for name, counts in tally.regions.items():
@@ -132,7 +132,7 @@ class FrameConditions:
             self._parts[variant, name].extend((result.frame.number, wrong, pixels))
 
     def interrupt(self) -> None:
-        """Note that the next frame does not follow the one before."""
+        """Note that the next frame does not follow the last one."""
         self._before = None
 
     @property
@@ -150,19 +150,19 @@ class FrameConditions:
         return table
 
     def parts(self, variant: str, classes: Sequence[TruthClass] = ()) -> pd.DataFrame:
-        """Return for each part of each frame the wrong and all labelled pixels of a final mask.
+        """Return the wrong and the labelled pixels of a final mask: a row for each frame and part.
 
-        ``classes`` are those of the truth, in the order of codes; each is a part, ``on <name>``.
+        ``classes`` are the truth's, in the order of codes; each is a part, ``on <name>``.
         """
         import pandas as pd
 
         columns, tables = ["frame", "wrong", "N"], []
-        for (of, part), numbers in self._parts.items():
+        for (owner, part), numbers in self._parts.items():
             name, truth = part, "other"
             if isinstance(part, int):
                 value, name, truth = classes[part] if classes else (0, "", "ignored")
                 name = f"{ON_CLASS}{name or f'class {value}'}"
-            if of == variant and truth != "ignored":
+            if owner == variant and truth != "ignored":
                 rows = pd.DataFrame(np.reshape(numbers, (-1, 3)), columns=columns)
                 if truth == "road":
                     rows["wrong"] = rows["N"] - rows["wrong"]

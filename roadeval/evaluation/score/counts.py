@@ -23,9 +23,9 @@ Name = tuple[str, str]
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
     """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
 
-    ``masks`` are ``(K, H, words)``: road. Ignored pixels are in no count. ``regions`` are R masks,
-    ``(H, words)`` each, which may overlap. Returned are ``(K, 1 + R, 4)`` int64: for each mask the
-    four counts of the whole frame, then of each region.
+    ``masks`` are ``(K, H, words)``, set for road. ``regions`` are R masks, ``(H, words)`` each, and
+    may overlap. The result is ``(K, 1 + R, 4)`` int64: for each mask the four counts of the
+    whole frame, then of each region. Ignored pixels are in no count.
     """
     inside = flat([everywhere(truth.shape), *regions])
     classes = flat([truth.road, truth.other])
@@ -37,9 +37,9 @@ def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
 def error_map(mask: data.Mask, truth: data.Truth) -> data.Layer:
     """Classify each pixel by its outcome, as in `roadeval.data.ERRORS`.
 
-    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` is alike, but 255 for ignored pixels.
+    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` also has 255 for ignored pixels.
     """
-    # TN 0 and TP 1 if the two agree, else FP 2 and FN 3; ignored pixels are beyond 4.
+    # TN 0 and TP 1 where the two agree, else FP 2 and FN 3; ignored pixels get more than 4.
     return data.Layer(ERRORS, np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED)))
 
 
@@ -52,7 +52,7 @@ def flat(masks: Bits | Sequence[Bits]) -> Bits:
 def changes(
     names: Sequence[Name], masks: Bits, truth: TruthBits
 ) -> dict[data.Transition, data.Change]:
-    """Count what each stage changed in the mask before it, and each final mask in the others.
+    """Count the changes from each stage's mask to the next, and between final masks.
 
     ``names`` are variant and stage of each mask, a variant's stages in the order they ran;
     ``masks`` are ``(K, H, words)``. Ignored pixels are in no count.
@@ -82,17 +82,17 @@ class _VariantSums:
         """Boundary F and boundary IoU, and the frames that have each."""
         self.trimap = np.zeros((len(TRIMAP), 2), np.int64)
         self.pairs = np.zeros(4, np.int64)
-        """Pairs of frames; the pixels that both label; those that change in the mask, and in the
-        truth."""
+        """Numbers of pairs of frames, of pixels labelled in both, and of pixels that change in the
+        mask and in the truth."""
 
 
 class EdgesAndFlicker:
     """Sums up boundary F, boundary IoU, trimap and flicker of every final mask.
 
     ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
-    ``L_t`` are the pixels that both truths label. ``truth_flicker`` is that of the truth: what
-    moves must change, and only changes beyond it are flicker. Motion is not removed by optical
-    flow, as it is in [1]_. ``width`` is the tolerance of boundary F in pixels.
+    ``L_t`` are the pixels that both truths label. ``truth_flicker`` is that of the truth: moving
+    objects must change, so only what exceeds it is flicker. Motion is not removed by optical flow,
+    as it is in [1]_. ``width`` is the tolerance of boundary F in pixels.
 
     References
     ----------
@@ -131,7 +131,7 @@ class EdgesAndFlicker:
         self._before = None
 
     def totals(self) -> dict[str, dict[str, Any]]:
-        """Return by variant what is summed up; None is undefined.
+        """Return the means and sums by variant; None if undefined.
 
         ``boundary_F`` and ``boundary_IoU`` are means over the frames that have them, ``trimap`` has
         the pixels of all frames. The baseline, whose mask is always the same, has no flicker.
@@ -195,7 +195,7 @@ def contours(
     near_truth, q = grow(true_edge, disk(width), truth), ones(true_edge)
     road, other, near, by_mask = truth.road, truth.other, [], {}
     for before, after in pairwise((0, *widths)):
-        # A square grown by a square is the square of both widths.
+        # Dilating by one square, then by another, is dilating by a square of both widths.
         road, other = (grow(side, square(after - before), truth) for side in (road, other))
         near.append(road & other)
     counted = flat([labelled, *(mask ^ truth.road for mask in masks.values())])
@@ -218,7 +218,7 @@ def contours(
 
 
 def edge_of(labels: TruthBits) -> Bits:
-    """Mark the road pixels that touch non-road, by side or corner: ``(H, words)``.
+    """Return the road pixels that touch non-road, by side or corner: ``(H, words)``.
 
     Neither the image's border nor an ignored pixel makes an edge.
     """

@@ -1,4 +1,4 @@
-"""How much worse a variant is on disturbed images than on the same frames as they are."""
+"""How much worse a variant is on disturbed images than on the same images undisturbed."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Degradation:
 
     @property
     def text(self) -> str:
-        """The disturbance as it is typed, as ``fog:2``."""
+        """The disturbance as the user writes it, such as ``fog:2``."""
         return str(Disturbance(self.kind, self.strength))
 
 
 Degradations = dict[str, dict[str, Degradation]]
-"""By variant, and by the disturbance's name, as ``fog-2``."""
+"""By variant, and by the disturbance's name, such as ``fog-2``."""
 
 
 def degradations(
@@ -42,8 +42,8 @@ def degradations(
 ) -> Degradations:
     """Compare final masks of disturbed frames with those of the table ``frames`` of a drive.
 
-    ``disturbed`` has their counts by ``disturbance``, as ``fog:2``. The mean of several cameras is
-    that of their means.
+    ``disturbed`` has their counts by ``disturbance``, such as ``fog:2``. With several cameras, ERR
+    is the mean of the cameras' means.
     """
     last, changes = finals(frames), dict[tuple[str, str], Degradation]()
     for (variant, text), rows in group_rows(disturbed, ["variant", "disturbance"]):
@@ -56,7 +56,7 @@ def degradations(
 
 
 def as_corrected(changes: Mapping[tuple[str, str], Degradation]) -> Degradations:
-    """Return changes by variant and disturbance, corrected for their number."""
+    """Return changes by variant and disturbance, with p-values corrected for their number."""
     family = holm([change.difference for change in changes.values()])
     corrected = zip(changes.items(), family, strict=True)
     return as_tree((names, replace(change, difference=d)) for (names, change), d in corrected)

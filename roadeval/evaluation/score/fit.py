@@ -1,7 +1,7 @@
 """Whether truth, masks and images belong together: to the same frame, side and place.
 
 Edges of a mask lie on edges of its image, and near edges of the truth, whatever the mask gets
-wrong. So the edges of the truth, and of each mask from elsewhere, are compared with their frame and
+wrong. So the edges of the truth, and of masks from other systems, are compared with their frame and
 its neighbours: plainly, mirrored, upside down and moved. A change that fits much better than the
 plain pairing, in nearly all frames, is a finding. Findings change no number.
 """
@@ -23,7 +23,7 @@ from roadeval.data import IGNORE, ROAD, Frame, Packed
 from roadeval.data.arrays import Floats, Places, Plane
 
 TRUTH: Final = "truth"
-"""The subject that is not a method's mask."""
+"""The name of the truth among the subjects; others are methods' masks."""
 SPOTS: Final = 20
 """Number of frames of a drive that are examined, spread evenly."""
 LAST_LAG: Final = 5
@@ -35,26 +35,26 @@ _WIDEST: Final = 640
 _SMALLEST: Final = 96
 """Least height and width of examined images in pixels."""
 _MARGIN: Final = _FAR + 2
-"""Pixels at the image's border whose edges do not count: a move may bring them in from beyond."""
+"""Pixels at the image's border that are left out, because a move may bring outside pixels there."""
 _POINTS: Final = 200
 """Approximate number of points of a mask's edge that are examined."""
 _REACH: Final = 20
 """Greatest distance from another mask's edge that is measured, in pixels."""
 _NEAR: Final = 3.0
-"""Least move that is named, in pixels: the masks of many methods lie a little off."""
+"""Least move that is reported, in pixels: the masks of many methods lie a little off."""
 _CLEAR: Final = 0.7
-"""Nearness to the truth above which a mask's outline is clear, so a move differs from growth."""
+"""Nearness to the truth above which a mask's outline is clear enough to tell a move from growth."""
 _IMAGE: Final = 1.5
 """Weight of the image's edges relative to the truth's in the search for a move."""
 _LEAST: Final = 6
 """Number of spots that a finding needs."""
 _SURE: Final = 2.5
-"""Least mean gain of what fits better over the spots, in standard errors."""
+"""Least mean gain in fit over the spots, in standard errors."""
 _MUCH: Final = 0.04
 """Least mean gain, as a share of how well the plain pairing fits."""
 _STILL: Final = 0.005
-"""Mean share of pixels whose truth changes between spots, up to which a scene stands still: then
-a bad method's masks cannot be told from moved ones."""
+"""Mean share of pixels that change in the truth between spots, up to which a scene stands still: a
+bad method's masks then look like moved ones."""
 _UPSIDE: Final = 0.4
 """Least excess of the share of road high in the image over the share before the vehicle, if road
 and the rest are exchanged."""
@@ -63,9 +63,9 @@ _MOVES: Final = _SQUARE[:, np.hypot(*_SQUARE[:, :, 0]) <= _FAR]
 """``(2, K, 1)``: pixels down and to the right."""
 _STAY: Final = np.zeros((2, 1, 1), np.intp)
 _GROWTHS: Final = np.arange(-8, 9)
-"""Pixels by which a whole edge may lie farther out or in: that is a method's style, no finding."""
+"""Pixels by which a whole edge may lie farther out or in without a finding: methods differ so."""
 _NEARNESS: Final = 1 / (1 + ((np.arange(-_REACH, _REACH + 1)[:, None] - _GROWTHS) / 2.5) ** 2)
-"""``(distances, growths)``: how near a point lies to an edge once its mask is grown so far."""
+"""``(distances, growths)``: how near a point lies to an edge after growth of its mask."""
 
 
 class Misfit(StrEnum):
@@ -105,13 +105,13 @@ class _Mask:
     x: Places
     y: Places
     normals: _Slopes
-    """``(n,)`` each: points of the edge, and its normals, of length 1, which point inside."""
+    """``(n,)`` each: the points of the edge, and unit normals there that point inside."""
     distances: Plane
-    """``(H, W)``: distance to the edge, `_REACH` at it, less inside, more outside."""
+    """``(H, W)``: signed distance to the edge plus `_REACH`; it is less inside the mask."""
 
     @classmethod
     def of(cls, road: Plane, ignored: Plane) -> _Mask:
-        """Return the edge of an ``(H, W)`` mask of 0 and 255, away from what is ignored."""
+        """Return the edge of an ``(H, W)`` mask of 0 and 255, without parts near ignored pixels."""
         import cv2
 
         edge = _edge(road, ignored)
@@ -124,7 +124,7 @@ class _Mask:
         return cls(x, y, normals, distances)
 
     def turn(self, way: int) -> _Mask:
-        """Return it with left and right exchanged if ``way`` is 1, or upside down if it is 0."""
+        """Return the mask mirrored if ``way`` is 1, or upside down if it is 0."""
         last = self.distances.shape[way] - 1
         x, y = (last - self.x, self.y) if way else (self.x, last - self.y)
         normals = -self.normals.conj() if way else self.normals.conj()
@@ -143,7 +143,7 @@ class _View:
 
 
 def _slopes(picture: Plane) -> _Slopes:
-    """Return the slopes of a picture, in multiples of their mean size."""
+    """Return the gradients of a picture, ``(H, W)``, divided by their mean size."""
     import cv2
 
     ways = cv2.spatialGradient(cv2.GaussianBlur(picture, (5, 5), 1.2))
@@ -152,7 +152,7 @@ def _slopes(picture: Plane) -> _Slopes:
 
 
 def _edge(road: Plane, ignored: Plane) -> Plane:
-    """Return the edge of an ``(H, W)`` mask, nonzero there, away from what is ignored."""
+    """Return the edge of an ``(H, W)`` mask as nonzero, without parts near ignored pixels."""
     import cv2
 
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -162,7 +162,7 @@ def _edge(road: Plane, ignored: Plane) -> Plane:
 
 
 def _points(edge: Plane) -> _Points:
-    """Return some points of an edge, away from the border."""
+    """Return about `_POINTS` points of an edge, away from the border."""
     inner = edge[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN]
     places = np.flatnonzero(inner != 0)
     y, x = np.divmod(places[:: max(1, len(places) // _POINTS)], inner.shape[1])
@@ -172,7 +172,7 @@ def _points(edge: Plane) -> _Points:
 def _fit(mask: _Mask, image: _Slopes, other: _Points | None, moves: npt.NDArray[np.intp]) -> Floats:
     """Return how well a mask fits an image and another mask's edge after it is moved back.
 
-    ``moves`` are ``(2, K, 1)``, or ``(2, K, n)`` if each point has its own move. Returned is
+    ``moves`` are ``(2, K, 1)``, or ``(2, K, n)`` if each point has its own move. The result is
     ``(K, 1 + growths)``: the agreement with the image's edges, -1 to 1, and the nearness to the
     other edge at each of `_GROWTHS`, 0 to 1, or NaN if there is none.
     """
@@ -198,8 +198,8 @@ def _fit(mask: _Mask, image: _Slopes, other: _Points | None, moves: npt.NDArray[
 class FitCheck:
     """Collects, frame by frame in the drive's order, how well truth and masks fit.
 
-    ``numbers`` are the frames, of which each ``stride``-th is read; ``spots`` of them are examined,
-    and their neighbours. Time and memory do not grow with the drive.
+    ``numbers`` are the frames' numbers, and every ``stride``-th frame is read. About ``spots``
+    frames and their neighbours are examined. Time and memory do not grow with the drive.
     """
 
     def __init__(self, numbers: Sequence[int], stride: int = 1, spots: int = SPOTS) -> None:
@@ -209,10 +209,10 @@ class FitCheck:
         self._shape: tuple[int, ...] = ()
         """Shape of the first image; images of another size are left out."""
         self._times = 1
-        """Number of its columns, and of its rows, that become one."""
+        """Number of its columns, and of its rows, that are averaged into one."""
         self._recent: deque[_View] = deque(maxlen=LAST_LAG)
         self._open: list[tuple[int, dict[str, _Mask]]] = []
-        """Frame and masks of the spots that still wait for later neighbours."""
+        """Frame number and masks of each spot that waits for later neighbours."""
         self._fits = defaultdict[Finding, dict[int, Floats]](dict)
         """Fits by change and by frame of a spot; a lag of 0 is no change."""
         self._moves = defaultdict[str, list[tuple[Floats, Floats]]](list)

@@ -1,4 +1,4 @@
-"""One frame against its truth: counts, rates, error maps, health; and the baseline."""
+"""The score of one frame: counts, rates, error maps, health; and the ``blind`` baseline."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ def score_frame(
     *,
     ground: Ground | None = None,
 ) -> FrameResult:
-    """Score one frame as its role demands; only an `EVALUATED` one is counted, and needs a truth.
+    """Score one frame by its role; only an `EVALUATED` frame is counted, and it needs a truth.
 
-    A training frame tells how probable its road and the rest are, a frame without truth how much
-    each mask is in doubt, and a frame that was picked by rank its ERR, apart from all counts. A
-    variant's final mask is that of its last stage. ``prior`` is the ``blind`` baseline, or None if
-    no frame with truth was trained on; ``ground`` is what lies before the camera, if it is known.
+    A training frame gives histograms of the probability of road, a frame without truth gives the
+    doubt in each mask, and a frame that was picked by rank gives ERR apart from all counts. A
+    variant's final mask is the mask of its last stage. ``prior`` is the ``blind`` baseline, or None
+    if no frame with truth was trained on; ``ground`` is None if the camera is not known.
     """
     result, truth = FrameResult(frame, role, variants), frame.truth
     if role is Role.UNLABELLED:
         return replace(result, doubts=doubts_of(variants))
     if truth is None:
         if role is Role.EVALUATED:
-            raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
+            raise ValueError(f"frame {frame.number} cannot be evaluated: it has no truth")
         return result
     if role is Role.TRAINING:
         by_stage = _probabilities(variants).items()
@@ -81,7 +81,7 @@ def _evaluate(
     prior: BlindPrior | None,
     ground: Ground | None,
 ) -> FrameResult:
-    """Return the result with all that is counted of an evaluated frame."""
+    """Return the result of an evaluated frame with all its counts and rates."""
     frame, variants, labels = result.frame, result.variants, TruthBits.of(truth)
     masks = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
     if prior is not None:
@@ -129,7 +129,7 @@ def _evaluate(
 
 
 def _probabilities(variants: Sequence[data.VariantResult]) -> dict[Name, data.Probability]:
-    """Return how probable road is, for each stage that says so."""
+    """Return the probabilities of road, by variant and stage, of the stages that have them."""
     return {
         (variant.variant, result.stage): result.output.probability
         for variant in variants
@@ -153,7 +153,7 @@ def tally(
 
 
 def judge(rates: Mapping[str, float], blind: Mapping[str, float] | None) -> data.Health:
-    """Return a variant's health by its final mask's rates and the baseline's, if there is one.
+    """Return a variant's health from the rates of its final mask and of the baseline, if any.
 
     An undefined rate counts neither for nor against it. `roadeval.evaluation.settings` gives the
     thresholds and their reasons.
@@ -169,14 +169,14 @@ class BlindPrior:
     """Where the road was in the training frames."""
 
     road: Values
-    """``(H, W)`` float32: the share of the training frames in which a pixel was road, among those
-    that label it; 0 if none does."""
+    """``(H, W)`` float32: of the training frames that label a pixel, the share in which it is road;
+    0 if no frame labels it."""
 
     @classmethod
     def of_truths(cls, truths: Sequence[data.Truth]) -> BlindPrior:
-        """Average the truths, each ``(H, W)`` uint8 with 255 for ignored; a ValueError for none.
+        """Average truths, ``(H, W)`` uint8 with 255 for ignored; a ValueError if there are none.
 
-        Truths of another size than the first are resized to it, nearest pixel.
+        Truths of another size than the first are resized to its size, by the nearest pixel.
         """
         if not truths:
             raise ValueError("a prior needs at least one truth")
@@ -191,7 +191,7 @@ class BlindPrior:
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
-        """Return the mask for a frame of ``shape`` (height, width): road from one half."""
+        """Return the mask for a frame of ``shape`` (height, width): road if at least one half."""
         import cv2
 
         return Packed.of(cv2.resize(self.road, shape[::-1]) >= 0.5)

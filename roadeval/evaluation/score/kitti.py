@@ -1,8 +1,8 @@
 """KITTI's road benchmark: masks in bird's-eye view, by the rule of its development kit.
 
-Cells of 5 cm lie from 6 to 46 m ahead and 10 m to either side. Each takes the pixel that the kit
-takes, which counts pixels from 1. Cells outside the picture, or outside the area that is evaluated,
-are in no count; the frames of a category are counted together. See `metre_sums.kitti`.
+Cells of 5 cm lie from 6 to 46 m ahead and 10 m to either side. Each cell has the same pixel as in
+the kit, which counts pixels from 1. Cells outside the picture, or outside the evaluated area, are
+in no count; the frames of a category are counted together. See `metre_sums.kitti`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from roadeval.evaluation.score.thresholds import Curves
 from roadeval.geometry.ground import Ground, ground_under
 
 CATEGORIES: Final = {"um": "UM", "umm": "UMM", "uu": "UU"}
-"""By the beginning of an image's name; URBAN are all together."""
+"""Categories by the beginning of an image's name; URBAN is all of them together."""
 
 
 def count_levels(
@@ -29,8 +29,8 @@ def count_levels(
 ) -> dict[Name, Histogram]:
     """Count the cells of a frame by threshold: ``(2, 256)`` uint32, non-road and road.
 
-    Keys are variant and category; of other images there are none. A mask without probabilities has
-    two thresholds.
+    Keys are variant and category; the result is empty for an image without a category. A mask
+    without probabilities has two thresholds.
     """
     category, lens = CATEGORIES.get(frame.name.partition("_")[0]), frame.calibration
     if frame.truth is None or category is None or lens is None or lens.mounting is None:
@@ -58,7 +58,7 @@ def pixels_above(ground: Ground) -> npt.NDArray[np.intp]:
 
 
 def benchmark(curves: Curves) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return ``frames`` and rates by variant and category."""
+    """Return the number of ``frames`` and the rates by variant and category."""
     rates: dict[str, dict[str, dict[str, Any]]] = {}
     for name in dict.fromkeys(variant for variant, _ in curves.counts):
         for title in (*CATEGORIES.values(), "URBAN"):

@@ -1,8 +1,8 @@
-"""Labels that look wrong: areas where the truth contradicts what tells it well elsewhere.
+"""Labels that look wrong: areas where the truth contradicts predictions that are right elsewhere.
 
 Methods and the labels of the frames before and after, moved with the picture, predict each label.
-A prediction counts by how rarely it is wrong there on other frames, the near ones above all: what a
-method always gets wrong is no sign against a label.
+The rarer a prediction is wrong there on other frames, near frames above all, the more it counts: an
+error that a method always makes is no sign against a label.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ _CELL: Final = 8
 _NEAR: Final = 5
 """Number of labels before and after one that count as near."""
 _LEAST: Final = 0.02
-"""Least share of errors that is believed of any prediction."""
+"""Least share of errors that is assumed for a prediction."""
 _STILL: Final = 12
-"""Greatest mean difference, in grey levels, of a place from the same place in the next image."""
+"""Greatest mean difference in grey levels up to which a place looks the same in two images."""
 _AGAINST: Final = 1.0
 """Log odds above which a pixel's label looks wrong."""
 _SMALL: Final = 0.0015
-"""Greatest share of the image of a speck or a hole."""
+"""Greatest size of a speck or a hole, as a share of the image."""
 _SPECKS: Final = 4
-"""Weight of specks and holes: no method and no scene has many, so few pixels say much."""
+"""Weight of specks and holes: they are rare in masks and scenes, so few pixels say much."""
 _REACH: Final = 12
 """Greatest move that explains a label, in pixels."""
 _UNKNOWN: Final = 255
-"""Stands for a prediction that says nothing."""
+"""The code of pixels without a prediction."""
 _FLOOR: Final = 0.0025
-"""Score, per pixel, below which no label differs from any other."""
+"""Score per pixel below which labels are not told apart."""
 _CLEAR: Final = 4
 """Multiple of the usual score of a drive from which a label is clearly wrong."""
 _MUCH: Final = 10
-"""Such a multiple where only methods say so, which may err themselves."""
+"""The same multiple if only methods contradict the label: they may be wrong themselves."""
 
 
 class LabelFlaw(StrEnum):
@@ -71,7 +71,7 @@ class Suspect(NamedTuple):
     reason: str
     """A `LabelFlaw`."""
     detail: str
-    """The other frame's number, the move in pixels, or what an area is instead; else empty."""
+    """The other frame's number, the move in pixels, or what the area should be; else empty."""
     top: int
     left: int
     bottom: int
@@ -95,7 +95,7 @@ class LabelledView:
     masks: Mapping[str, Plane]
     """The final masks of methods by their names, 0 to 254."""
     times: int
-    """Number of columns, and of rows, that became one."""
+    """Number of columns, and of rows, that are averaged into one."""
 
     @classmethod
     def of(
@@ -118,7 +118,7 @@ class LabelledView:
 
 
 def find_suspects(views: Sequence[LabelledView]) -> pd.DataFrame:
-    """Return a `Suspect` for each label with an area that looks wrong, in the order of the views.
+    """Return a row, a `Suspect`, for each label that looks wrong, in the order of the views.
 
     The views are successive labelled frames of one size; more of them tell more.
     """
@@ -140,9 +140,10 @@ def find_suspects(views: Sequence[LabelledView]) -> pd.DataFrame:
 
 
 def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFrame:
-    """Return at most ``count`` suspects of all ``labels``, the worst first and one a scene.
+    """Return at most ``count`` suspects, the worst first and one for each scene.
 
-    The column ``clear`` is whether a label is clearly wrong, not only worth a look.
+    ``labels`` is the number of all examined labels. The column ``clear`` tells whether a label is
+    clearly wrong, not only worth a look.
     """
     scores = np.zeros(max(labels, 1))
     scores[: len(suspects)] = suspects["score"]
@@ -156,9 +157,9 @@ def rank_suspects(suspects: pd.DataFrame, labels: int, count: int) -> pd.DataFra
 
 
 def _carry_label(near: LabelledView, view: LabelledView) -> Plane | None:
-    """Return the label of a frame as it moves with the picture to another frame.
+    """Return the label of a frame, ``(H, W)``, moved with the picture to another frame.
 
-    It is `_UNKNOWN` where the moved picture is unlike the other frame's; None of narrow pictures.
+    Pixels where the moved picture differs are `_UNKNOWN`; None if the picture is narrow.
     """
     import cv2
 
@@ -183,7 +184,7 @@ def _carry_label(near: LabelledView, view: LabelledView) -> Plane | None:
 def _odds_against(
     views: Sequence[LabelledView], predictions: Sequence[Plane | None]
 ) -> npt.NDArray[np.float32]:
-    """Return the log odds, ``(n, H, W)``, against the labels by a prediction of each."""
+    """Return the log odds, ``(n, H, W)``, against labels from one prediction of each label."""
     import cv2
     from scipy.ndimage import convolve1d
 
@@ -200,7 +201,7 @@ def _odds_against(
                 part[place] = cv2.blur(
                     cv2.resize(plane, cells, interpolation=cv2.INTER_AREA), (3, 3)
                 )
-    # Half a frame of errors in one frame is what is believed before any frame is seen.
+    # The prior is half a frame of errors in one frame.
     total = sums.sum(axis=1, keepdims=True)
     near = convolve1d(sums, np.ones(2 * _NEAR + 1), axis=1, mode="constant")
     errors, near_errors = ((part[0] + 0.5) / (part[1] + 1) for part in (total - sums, near - sums))
@@ -249,7 +250,7 @@ def _find_suspect(
 def _explain(
     views: Sequence[LabelledView], roads: Flags, place: int, wrong: Flags
 ) -> tuple[LabelFlaw | None, str]:
-    """Return which one mistake makes a label as it is; the number of the frame, or the move."""
+    """Return the one mistake that explains a label, and the other frame's number or the move."""
     import cv2
 
     view, road = views[place], roads[place]

@@ -1,4 +1,4 @@
-"""Measures in metres summed up over a drive, and how much a wrong camera would change them."""
+"""Measures in metres, summed up over a drive, and their change with other camera stances."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _COLUMNS: Final = (
 
 
 def measure(survey: Survey, masks: Mapping[str, Bits], truth: TruthBits) -> dict[str, FrameMetres]:
-    """Measure masks against the truth, ``(H, words)`` each, by name.
+    """Return the measures of masks, ``(H, words)`` each, against the truth, by name.
 
-    The last of their regions is the ground seen from above.
+    The last region of each is the ground seen from above.
     """
     bits = np.array([*masks.values()], np.uint64)
     inside = [band for bands in survey.bands for band in bands.values()]
@@ -52,13 +52,13 @@ class MetreSums:
         self._measures: Sequence[tuple[str, int]] = ()
         self._regions: Sequence[str] = ()
         self._differences = defaultdict[tuple[str, int], Counter[int]](Counter)
-        """By variant and by place among stances and measures: how often each occurs, in cm."""
+        """By variant and place in ``(S, M)``: how often each difference occurs, in centimetres."""
         self._seen: dict[str, Sums] = {}
-        """``(M,)``: frames on which the truth has the measure."""
+        """``(M,)`` by variant: number of frames on which the truth has the measure."""
         self._rates: dict[str, Floats] = {}
-        """``(S, R, 2)``: sums of the frames' ERR, and frames that have one."""
+        """``(S, R, 2)`` by variant: sum of the frames' ERR, and number of frames that have ERR."""
         self._above: dict[str, Sums] = {}
-        """``(4,)``: cells of the ground seen from above, by outcome."""
+        """``(4,)`` by variant: ground cells by outcome."""
 
     def add(self, metres: Mapping[str, FrameMetres]) -> None:
         """Add a frame's measures."""
@@ -77,8 +77,8 @@ class MetreSums:
     def totals(self, curves: Curves) -> Iterator[dict[str, Any]]:
         """Yield the rows of ``metres``, variant by variant.
 
-        ``curves`` are of the ground seen from above: if a final mask is a threshold on how probable
-        road is, they give MaxF and AP11.
+        ``curves`` are of the ground seen from above: they give MaxF and AP11 if a final mask comes
+        from a threshold on the probability of road.
         """
         levels = {variant: counts for (variant, _), counts in curves.counts.items()}
         for cells in self._rows(levels):
@@ -103,14 +103,14 @@ class MetreSums:
                 yield (variant, measured, where, frames, missing, value, p95, *ends)
 
     def _metres_off(self, variant: str, place: int) -> Floats:
-        """Return a variant's differences at a place, ``(n,)`` metres, in no order."""
+        """Return a variant's differences at a place, ``(n,)`` metres, in no particular order."""
         counter = self._differences[variant, place]
         counts = np.array([*counter.values()], int)
         return np.repeat(np.array([*counter], float) / CENTIMETRES, counts)
 
 
 def _with_range(values: Floats) -> tuple[float, float, float]:
-    """Return the value of the first stance, and the least and the greatest of all stances."""
+    """Return the first stance's value and the least and greatest of all, NaN for one stance."""
     if len(values) > 1 and not np.isnan(values).any():
         return float(values[0]), float(values.min()), float(values.max())
     return float(values[0]), math.nan, math.nan
@@ -119,7 +119,7 @@ def _with_range(values: Floats) -> tuple[float, float, float]:
 def differences_of(metres: FrameMetres) -> Floats:
     """Return mask minus truth, ``(S, M)`` metres: positive if the mask reaches too far.
 
-    Too far means beyond an edge of the road, or ahead.
+    That is too far ahead, or beyond the left or right edge of the road.
     """
     outwards = [1 if measure in (LEFT, FREE) else -1 for measure, _ in metres.measures]
     differences: Floats = (metres.ends[..., 0] - metres.ends[..., 1]) * outwards
@@ -137,7 +137,7 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     """Compute the rates of KITTI's road benchmark from cells of the ground seen from above [1]_.
 
     ``counts`` are a mask's TP, TN, FP and FN, ``(4,)``: they give ``F1``, ``precision`` and
-    ``recall``. ``levels`` are the cells by how probable road is, ``(2, 256)`` as of
+    ``recall``. ``levels`` are the cells by probability of road, ``(2, 256)`` as of
     `Survey.levels`: they give ``MaxF``, the greatest F1 of 256 thresholds, with the rates there;
     and ``AP11``, the mean over eleven recalls from 0 to 1 of the greatest precision at that recall
     or more. All are NaN without road.
@@ -151,7 +151,7 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
         cells = Counts(*counts.tolist())
         rates = {name: metrics.UNTABLED[name].function(cells) for name in ("F1", "precision")}
         return {**rates, "recall": metrics.METRICS["TPR"].function(cells)}
-    # Road are the cells of at least the probability k / 255.
+    # At threshold k, cells with a probability of at least k / 255 are road.
     negative, positive = levels[:, ::-1].cumsum(axis=1)[:, ::-1]
     with_road = positive > 0
     precision = positive[with_road] / (positive + negative)[with_road]

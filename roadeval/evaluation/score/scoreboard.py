@@ -1,9 +1,9 @@
 """The scoreboard of a drive: frames are scored one by one, added in order and summed up.
 
-Its differences are each variant minus ``unfiltered`` and minus ``blind``, and each tuned variant
-minus its method. The paper gives no number for figures 3a and 3b, and their curves are lost. What
-is left are claims that one mask is wrong less often than another; each window of ten frames
-confirms one or does not.
+Differences are computed for each variant minus ``unfiltered`` and minus ``blind``, and for each
+tuned variant minus its method. The paper gives no numbers for figures 3a and 3b, and their curves
+are lost. Only its claims that one mask is wrong less often than another can be checked: each window
+of ten frames confirms a claim or does not.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Effect:
 
 
 def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Effect]:
-    """Compute the differences of a drive: of final masks, and of the filter stage by stage."""
+    """Compute the differences of a drive: between final masks, and by the filter at each stage."""
     masks = masks_of(frames)
     finals = final_stages(masks)
     tuned = {name.removesuffix(TUNED): name for name in finals if name.endswith(TUNED)}
@@ -85,7 +85,7 @@ def drive_effects(frames: pd.DataFrame, settings: EvaluationSettings) -> list[Ef
 
 
 def correct_effects(effects: Sequence[Effect]) -> list[Effect]:
-    """Correct final masks' differences of `TESTED`, all against one base, for their number."""
+    """Correct p-values of final masks' differences of `TESTED` from one base for their number."""
     family = iter(holm([effect.rates[TESTED] for effect in effects if effect.final]))
     return [
         replace(effect, rates={**effect.rates, TESTED: next(family)}) if effect.final else effect
@@ -100,17 +100,17 @@ CLAIMS: Final[Mapping[str, tuple[str, Name, Name]]] = {
     "svm_ERR": ("ERR", (FILTERED, "svm"), (FILTERED, "similarity")),
     "post_ERR": ("ERR", _WITH, (FILTERED, "svm")),
 }
-"""By the key in ``summary.json``: the rate that is lower for the first mask than for the second.
+"""Claims by key in ``summary.json``: the rate is lower for the first mask than for the second.
 
-Section 5 claims it for the filter, section 4.3 for the SVM, section 4.4 for the post-processing."""
+Section 5 has the claims on the filter, section 4.3 on the SVM, section 4.4 on post-processing."""
 
 
 def evidence(windows: pd.DataFrame, size: int) -> dict[str, dict[str, int]]:
-    """Count the windows that confirm each claim whose masks the drive has; equal rates do not.
+    """Count the windows that confirm each claim; equal rates do not confirm it.
 
-    Returned are by claim the number of full ``windows``, of ``size`` frames in both masks, that
-    have both rates, and the number in which it ``held``; ``short`` and ``short_held`` count windows
-    with fewer frames.
+    The result has, by claim, the number of full ``windows``, with ``size`` frames of both masks,
+    in which both rates are defined, and the number in which the claim ``held``; ``short`` and
+    ``short_held`` count windows with fewer frames. A claim is left out if the drive lacks a mask.
     """
     keys = [*KEY, "window"]
     by_mask = {mask: rows.set_index(keys) for mask, rows in tables.group_rows(windows, tables.MASK)}
@@ -133,9 +133,9 @@ class CountedRows:
 
     def __init__(self, *names: str) -> None:
         self._names: Final = names
-        """Columns of names, such as variant and stage."""
+        """Columns that name a mask, such as variant and stage."""
         self._rows: Final = array("I")
-        """Place of the frame, place of its names, and the four counts, again and again."""
+        """For each row the place of the frame, the place of the names, and the four counts."""
         self._places: Final[dict[tuple[str, ...], int]] = {}
 
     def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], data.Counts]]) -> None:
@@ -147,8 +147,8 @@ class CountedRows:
     def table(self, when: pd.DataFrame, orders: Mapping[str, Sequence[str]]) -> pd.DataFrame:
         """Return the rows with their rates, in the order in which they were added.
 
-        ``when`` has a row for each frame at its place; ``orders`` have by column the order of its
-        names, by default the order in which they first occur.
+        ``when`` has a row for each frame, at its place. ``orders`` has the order of the names of a
+        column; by default they are in the order in which they first occur.
         """
         import pandas as pd
 
@@ -168,10 +168,10 @@ def episodes(stamps: Sums, errors: Floats, limit: float) -> dict[str, Any]:
     """Return how long a drive's ERR was at or above a limit, and how soon it recovered.
 
     ``stamps`` are ``(n,)`` nanoseconds of evaluated frames, ``errors`` their ERR; NaN is left out.
-    An episode lasts from its first frame to the first one below the limit, and has ``recovered``
-    there. If the drive's end comes before, or a gap of more than a second and three usual steps, it
-    has not recovered, and lasts to its last frame. Times are in seconds, without gaps; ``share`` is
-    the share of the drive, ``recovery`` the median time of the episodes that recovered.
+    An episode lasts from its first frame to the first frame below the limit, where it has
+    ``recovered``. If the drive ends earlier, or a gap exceeds both a second and three usual steps,
+    it lasts to its last frame and has not recovered. Times are in seconds, without gaps; ``share``
+    is the share of the drive, ``recovery`` the median time of the episodes that recovered.
     """
     defined = np.flatnonzero(~np.isnan(errors))
     defined = defined[np.argsort(stamps[defined], kind="stable")]
@@ -202,8 +202,8 @@ class Scoreboard:
 
     ``key`` are the drive and the camera; ``variants`` are all names, in the order of the tables;
     ``prior`` is the ``blind`` baseline, or None if no frame with truth was trained on; ``ground``
-    is what lies before the camera, if it is known; ``focus`` is the variant by whose doubts frames
-    without truth rank, by default the first one.
+    is None if the camera is not known; frames without truth are ranked by the doubts on the variant
+    ``focus``, by default the first one.
     """
 
     def __init__(
@@ -217,7 +217,7 @@ class Scoreboard:
         focus: str | None = None,
     ) -> None:
         if BASELINE in variants:
-            raise ValueError(f"no variant may be called {BASELINE!r}")
+            raise ValueError(f"{BASELINE!r} is the baseline: rename the variant")
         self._key = key
         self._settings = settings
         self._order = (*variants, BASELINE)
@@ -234,9 +234,9 @@ class Scoreboard:
         self._oracles = CountedRows("variant", "oracle", "stage")
         self._disturbed = CountedRows("disturbance", "variant", "stage")
         self.heat = defaultdict[str, HeatMap](HeatMap)
-        """The places where each variant's final mask errs."""
+        """Heat maps of the errors of final masks, by variant."""
         self.changes = defaultdict[data.Transition, data.Change](data.Change)
-        """Every change between masks."""
+        """Sums of the changes between masks."""
         self.curves = Curves()
         self.classes = ClassSums()
         self.unlabelled = Unlabelled(focus or next(iter(variants), ""))
@@ -256,9 +256,9 @@ class Scoreboard:
         return score_frame(frame, role, variants, settings, prior, ground=self._ground)
 
     def add(self, result: data.FrameResult) -> tuple[data.Doubt, ...]:
-        """Add a scored frame: in the drive's order, from one thread.
+        """Add a scored frame, and return its doubts if it has no truth.
 
-        Returned are the doubts on a frame without truth.
+        Frames are added in the drive's order, from one thread.
         """
         doubts = self.unlabelled.add(result)
         self.conditions.add(result)
@@ -325,12 +325,12 @@ class Scoreboard:
     def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the evaluated frames' ERR at the threshold that is best on the training frames.
 
-        That tells little about a method that learnt from these frames. See `Curves.at_best_of`.
+        That tells little about a method that learnt from those. See `Curves.at_best_of`.
         """
         return self.curves.at_best_of(self._training)
 
     def summary(self, classes: Sequence[data.TruthClass] = ()) -> DriveSums:
-        """Sum up the drive; ``classes`` are those of its truth, in the order of codes."""
+        """Sum up the drive; ``classes`` are the classes of its truth, in the order of codes."""
         settings, frames = self._settings, self.frames()
         seconds = as_tree((name, total / runs) for name, (total, runs) in self._seconds.items())
         curves, beyond = self.curves.totals(), self._edges.totals()
@@ -362,7 +362,7 @@ class Scoreboard:
     def _slices(
         self, frames: pd.DataFrame, classes: Sequence[data.TruthClass]
     ) -> dict[str, list[Slice]]:
-        """Return the slices of each final mask; nothing if there are too few frames."""
+        """Return the slices of final masks by variant, if they have enough frames."""
         key, confidence = dict(zip(KEY, self._key, strict=True)), self._settings.confidence
         conditions = self.conditions.table().assign(**key)
         return {
@@ -382,12 +382,12 @@ class DriveSums:
     windows: pd.DataFrame
     effects: Sequence[Effect]
     parts: Mapping[str, Any]
-    """The parts of ``summary.json`` that the evaluation knows."""
+    """The parts of ``summary.json`` that the evaluation computes."""
     disturbed: pd.DataFrame
     """The counts of final masks of disturbed frames."""
 
     @property
     def times(self) -> dict[str, int]:
-        """Header stamps of the first and the last evaluated frame; none without any."""
+        """Header stamps of the first and the last evaluated frame; empty if there are none."""
         stamps = self.frames["stamp_ns"].tolist()
         return {"start_ns": stamps[0], "end_ns": stamps[-1]} if stamps else {}

@@ -1,10 +1,10 @@
-"""The rates at every threshold on the probability of road, from counts of pixels by its code.
+"""The rates at every threshold on the probability of road, from counts of pixels by probability.
 
-A stage that says how probable road is (`roadeval.data.Output.probability`) is one method for each
-threshold: road are the pixels with at least that probability. All labelled pixels of a drive count
-alike, as in KITTI's road benchmark [1]_. Two integers are kept for each code, so memory does not
-grow with the drive, and the order of the frames makes no difference. Beside them are heat maps of
-errors.
+A stage with probabilities (`roadeval.data.Output.probability`) gives a mask for each threshold:
+pixels with at least that probability are road. All labelled pixels of a drive have equal weight, as
+in KITTI's road benchmark [1]_. Two integers are kept for each 16-bit code of a probability, so
+memory does not grow with the drive, and the order of the frames makes no difference. Heat maps of
+errors are here, too.
 
 References
 ----------
@@ -42,13 +42,13 @@ class Thresholds(NamedTuple):
     """The outcomes at each threshold, from the highest to the lowest that occurs."""
 
     codes: Sums
-    """``(n,)`` int64: road are the pixels of at least this code, or level."""
+    """``(n,)`` int64: pixels of at least this code, or level, are called road."""
     tp: Sums
     fp: Sums
     """``(n,)`` int64: road and non-road pixels that are called road."""
     road: int
     other: int
-    """All road and non-road pixels."""
+    """Numbers of all road and of all non-road pixels."""
 
     @classmethod
     def of(cls, counts: Cells) -> Thresholds:
@@ -81,8 +81,8 @@ class Thresholds(NamedTuple):
     def max_f(self) -> dict[str, float | None]:
         """Return MaxF, the greatest ``F = 2 TP / (2 TP + FP + FN)`` over thresholds, F1 in [1]_.
 
-        Beside it are the ``threshold`` as a fraction, the highest of equal ones, and the
-        ``precision`` and ``recall`` there; all are None without road.
+        The result also has the ``threshold`` as a fraction, the highest of equally good ones, and
+        the ``precision`` and ``recall`` there; all are None without road.
         """
         names = "MaxF", "threshold", "precision", "recall"
         if not self.road:
@@ -112,7 +112,7 @@ def calibration(counts: Sums) -> dict[str, float]:
 
 
 class Curves:
-    """The labelled pixels of a drive by how probable road is, for each variant and stage."""
+    """The labelled pixels of a drive by probability of road, for each variant and stage."""
 
     def __init__(self) -> None:
         self.counts: dict[Name, Sums] = {}
@@ -122,7 +122,7 @@ class Curves:
     def at_best_of(self, others: Curves) -> dict[str, dict[str, dict[str, float]]]:
         """Return ERR of all pixels at the threshold that is best on other frames.
 
-        Returned are by variant and stage the ``threshold`` as a fraction, and ``ERR``.
+        The result has, by variant and stage, the ``threshold`` as a fraction, and ``ERR``.
         """
         rates = {}
         for name in (name for name in self.counts if name in others.counts):
@@ -153,7 +153,7 @@ class Curves:
 CELLS: Final = 160
 """Cells across the longer side of a heat map, at most."""
 PENDING: Final = 255
-"""Number of frames whose sum fits in a byte: bytes are added ten times as fast as integers."""
+"""Number of frames whose sum fits in bytes, which are added ten times as fast as integers."""
 
 
 class HeatMap:
@@ -183,10 +183,10 @@ class HeatMap:
         self._bytes += np.array([errors != IGNORED, errors == FP, errors == FN])
 
     def cells(self) -> tuple[int, Sums]:
-        """Return the cells' side in pixels, and their sums.
+        """Return the side of the cells in pixels, and their sums, ``(3, rows, columns)`` int64.
 
-        These are ``(3, rows, columns)`` int64: pixels that were labelled, FP and FN, over all
-        frames. The last row and column may be narrower.
+        The sums count labelled pixels, FP and FN over all frames. The last row and column may be
+        narrower.
         """
         self._carry()
         return self._side, self._sums.copy()

@@ -1,7 +1,7 @@
-"""Frames without truth: which to look at, and how far masks differ. None of it is an error rate.
+"""Frames without truth: which to look at, and how much masks differ. No sign is an error rate.
 
 On CamVid, without its truth, the 20 frames with the highest entropy included 9 and 6 of the ten
-worst; chance finds 2.2. As an error rate it would have been 1.2 % for masks that were 3.2 % wrong.
+worst; chance finds 2.2. Read as an error rate, entropy gives 1.2 % for masks that are 3.2 % wrong.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ SIGNS: Final[Mapping[str, str]] = {
     "disagreement": "share of pixels on which another variant differs, mean over the others",
     "flicker": "share of pixels that change from the frame before",
 }
-"""Signs of doubt with their meanings; frames are ranked by the first one that a variant has."""
+"""Signs of doubt with their meanings; a variant's frames are ranked by the first that it has."""
 _STEP: Final = 4
-"""Rows and columns from one pixel to the next; frames rank as with all pixels (r > 0.998)."""
+"""Step in rows and columns between pixels; frames rank as with all pixels (r > 0.998)."""
 
 
 @cache
@@ -82,7 +82,7 @@ class Unlabelled:
         self.focus: Final = focus
         self._stages: dict[str, str] = {}
         self._stamps, self._signs = array("q"), array("d")
-        """Numbers and stamps, and `SIGNS`, of the focus."""
+        """Number and stamp, and the values of `SIGNS`, of each frame of the focus."""
         self._differ = defaultdict[tuple[str, str], list[float]](lambda: [0.0, 0])
         self._before: Mapping[str, Packed] = {}
 
@@ -91,10 +91,10 @@ class Unlabelled:
         before, variants = self._before, result.variants if result.doubts else ()
         self._before = now = {v.variant: mask for v in variants for _, mask in v.masks()}
         doubts = []
-        for still in result.doubts:
-            name = still.variant
+        for without_flicker in result.doubts:
+            name = without_flicker.variant
             changed = _share(now[name], before[name]) if name in before else math.nan
-            doubt = replace(still, flicker=changed)
+            doubt = replace(without_flicker, flicker=changed)
             doubts.append(doubt)
             self._stages[name] = doubt.stage
             if name == self.focus:
@@ -121,13 +121,13 @@ class Unlabelled:
         return table
 
     def differing(self) -> dict[str, dict[str, float]]:
-        """Return for each pair of variants the mean share of pixels on which they differ."""
+        """Return the mean share of pixels on which two variants differ, by pair of variants."""
         pairs = [pair for pair in combinations(self._stages, 2) if pair in self._differ]
         return as_tree((pair, self._differ[pair][0] / self._differ[pair][1]) for pair in pairs)
 
 
 def sign_of(rows: pd.DataFrame) -> str | None:
-    """Return the one of `SIGNS` by which a variant's rows are ranked; None if it has none."""
+    """Return the sign, of `SIGNS`, by which a variant's rows are ranked; None if there is none."""
     return next((sign for sign in SIGNS if rows[sign].notna().any()), None)
 
 
@@ -142,21 +142,21 @@ def choose_frames(
 ) -> tuple[Sums, Sums]:
     """Choose frames to label: half of them at random, half by rank.
 
-    The random ones are the next in `draw_order`; one that is ``taken``, because it was chosen by
-    rank before, needs no further label. The ranked ones have the highest scores and are apart from
-    all others, if there are enough.
+    The random frames are the next ones in `draw_order`; a frame that is ``taken``, because it was
+    chosen by rank before, needs no new label. The ranked frames have the highest scores and are no
+    neighbours of other chosen ones, if there are enough.
 
     Parameters
     ----------
     stamps, scores
-        ``(n,)`` of all frames: nanoseconds, and how much each is in doubt, NaN if unknown.
+        ``(n,)`` of all frames: stamps in nanoseconds, and degrees of doubt, NaN if unknown.
     drawn, taken
         Number of frames that were drawn before, and the places of all frames that have a label.
 
     Returns
     -------
     tuple
-        The places of the random ones, and of the ranked ones.
+        The places of the random frames, and of the ranked frames.
     """
     scored = np.flatnonzero(np.isfinite(scores))
     half = -(-count // 2) if len(scored) else count

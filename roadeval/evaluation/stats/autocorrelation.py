@@ -1,19 +1,19 @@
-"""The mean of a series whose neighbours resemble each other, and how uncertain it is.
+"""The mean of a series in which neighbours resemble each other, and its uncertainty.
 
 A series is a first-order autoregression plus noise that is new on each frame. The coefficient and
 the noise's share of the variance are unknown: a grid of both is tried, and each model is weighted
-by how well it explains the slowest cosine coefficients of the series [1]_, which do not contain the
-mean. Given a model, the mean has Student's distribution; over all models it has a mixture of them.
+by how well it explains the slowest cosine coefficients of the series except the mean [1]_. Given a
+model, the mean has Student's distribution; over all models it has a mixture of these distributions.
 The result is a Student's distribution again: its precision is the average of the models', and its
 degrees of freedom are chosen for the 95 % interval of the mixture. Farther out the mixture is
 dominated by unlikely models with huge errors, which would hide any finding. Skewed series bend the
 distribution [2]_: a drive that met few bursts has a mean that is too low *and* a spread that is too
 small.
 
-``benchmarks/INTERVALS.md`` shows how often the intervals hold, beside those of textbooks. They do
+``benchmarks/INTERVALS.md`` compares how often these intervals and those of textbooks hold. They do
 not allow for drift that noise hides on a short drive, for drift that takes longer than the drive,
-and for bursts that a drive hardly met: there three or four of five hold rather than nineteen of
-twenty, and p-values are too small.
+or for bursts that are rare on a drive. In these cases three or four of five intervals hold instead
+of nineteen of twenty, and p-values are too small.
 
 References
 ----------
@@ -34,9 +34,9 @@ import numpy as np
 from roadeval.data.arrays import Floats
 
 _TAIL: Final = 0.025
-"""Student's distribution and the mixture have the same tails of this probability."""
+"""Probability of each tail, where Student's distribution and the mixture have the same limits."""
 _SHARES: Final = (1, 0.95, 0.75, 0.5, 0.25)
-"""The autoregression's shares of the variance that are tried."""
+"""The shares of the variance that are tried for the autoregression."""
 
 
 class MeanDistribution(NamedTuple):
@@ -50,7 +50,7 @@ class MeanDistribution(NamedTuple):
     degrees: float
     """An interval is ``mean ± t(degrees) standard_error``, skewness aside."""
     effective: float
-    """Independent values that would determine the mean as well."""
+    """Number of independent values that would determine the mean equally well."""
     skewness: float = 0.0
     """Skewness of the mean."""
 
@@ -80,9 +80,9 @@ def mean_distribution(
 ) -> MeanDistribution:
     """Estimate the mean of a stationary process from a stretch of it, ``(n,)``, n at least 4.
 
-    For values that are ``independent`` by design it is Student's distribution of textbooks. With
-    ``factors``, ``(n,)``, it is the sum of values times factors, as the difference of two parts'
-    means: the more slowly they change, the more of the slow errors it has.
+    Values that are ``independent`` by design give the Student's distribution of textbooks. With
+    ``factors``, ``(n,)``, the sum of values times factors is estimated instead, for example the
+    difference of two parts' means: the slower factors change, the more it has of the slow errors.
     """
     from scipy.fft import dct
     from scipy.special import beta, stdtr, stdtridf, stdtrit
@@ -118,7 +118,7 @@ def mean_distribution(
         return MeanDistribution(mean, error, degrees, effective)
     centred = series - mean
     skewness = float((centred**3).mean() / (centred**2).mean() ** 1.5)
-    # Only as far as it exceeds its standard error, which is that of independent normal values.
+    # Shrunk towards 0 unless it far exceeds its standard error, as of independent normal values.
     skewness = skewness**3 / (skewness**2 + 6 / effective) / math.sqrt(effective)
     return MeanDistribution(mean, error, degrees, effective, skewness)
 
@@ -127,14 +127,14 @@ def mean_distribution(
 def _models(n: int) -> tuple[Floats, Floats, Floats]:
     """Return the properties of the ``g`` models of the grid, for series of length ``n``.
 
-    They are the inverse variances of the cosine coefficients, in units of the series' variance,
-    ``(g, m)``; the logarithm of each model's prior weight times the factor of the likelihood that
-    depends on the model only, ``(g,)``; and the variance of the mean, ``(g,)``.
+    They are the inverse variances of the cosine coefficients for a variance of 1, ``(g, m)``;
+    the logarithm of each model's prior weight times the factor of the likelihood that depends on
+    the model only, ``(g,)``; and the variance of the mean, ``(g,)``.
     """
-    # Coefficients from 0 to a memory of ten lengths, closer together near 1, where they matter
-    # most. All are equally likely: their weights are proportional to their distance from 1.
+    # Coefficients reach from 0 to a memory of ten lengths, and are denser near 1, where they matter
+    # most. The prior is uniform, so their weights are proportional to the distance from 1.
     distance = _distances(n)
-    # The autoregression's shares of the variance: the whole is as likely as all others together.
+    # Prior of `_SHARES`: 1 is as likely as all other shares together.
     likely = np.array([0.5, 0.06, 0.12, 0.12, 0.2])
     count = min(max(90, round(2.5 * math.sqrt(n))), n - 1)
     slow = cosine_variances(1 - distance, count + 1, n)

@@ -2,12 +2,12 @@
 
 The masks are of the same frames, so their rates are subtracted frame by frame. Neighbouring frames
 of a drive resemble each other: `mean_distribution` tells how far off their mean may be. Drives are
-independent: interval and p-value are those of the exact sign-flip test below 30 groups of drives,
-and Student's from 30 on. An interval excludes 0 exactly if p is below one minus the confidence.
+independent: interval and p-value come from the exact sign-flip test below 30 groups of drives, and
+from Student's from 30 on. An interval excludes 0 exactly if p is below one minus the confidence.
 
-The sign-flip test needs no normal distribution, nor drives that vary alike. From ten groups on it
-holds as often as Student's; with six its interval reaches from the least to the greatest mean,
-which is wider, finds less, and holds more often where drives are skewed.
+The sign-flip test needs no normal distribution, and no equal variance of drives. From ten groups on
+its interval holds as often as Student's. With six it reaches from the least to the greatest mean:
+it is wider, detects less, and holds more often if drives are skewed.
 
 References
 ----------
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LEAST_GROUPS: Final = 6
-"""Groups of drives that an interval needs."""
+"""Number of groups of drives that an interval needs."""
 STUDENT_FROM: Final = 30
 """Number of groups from which the interval is Student's, which assumes a normal mean."""
 
@@ -60,21 +60,21 @@ class Difference:
     units: int
     """Number of frames or drives that have a difference."""
     effective: float | None = None
-    """Independent frames that would determine the mean as well; None without an interval, and over
-    drives."""
+    """Number of independent frames that would determine the mean equally well; None without an
+    interval, and over drives."""
     standard_error: float | None = None
     """The mean's standard error; None if `effective` is."""
     degrees: float | None = None
-    """Degrees of freedom: the interval is ``mean ± t(degrees) standard_error``, and the p-value
-    that of ``mean / standard_error``, apart from skewness and the room that the base leaves."""
+    """Degrees of freedom. Apart from skewness and the limits of the base's rate, the interval is
+    ``mean ± t(degrees) standard_error``, and the p-value that of ``mean / standard_error``."""
     groups: int | None = None
-    """Number of groups of drives, each of which counts as one; None within a drive."""
+    """Number of groups of drives, which have equal weights; None within a drive."""
     worse: int | None = None
     better: int | None = None
     equal: int | None = None
     """Number of units that are worse than the base, better, and exactly the same."""
     needed: int | None = None
-    """Units, or groups, that an interval needs; None if there is one."""
+    """Number of units, or groups, that an interval needs; None if there is an interval."""
     p_holm: float | None = None
     """The p-value after Holm's correction; None if none was applied, see `holm`."""
     comparisons: int | None = None
@@ -113,15 +113,15 @@ def interval(
 ) -> Difference:
     """Average ``(n,)`` paired differences, with an interval and the two-sided p-value of 0.
 
-    They are of a drive's frames in their order, or of drives; NaN is left out. ``averaged`` are the
-    values to average instead: moments that several cameras saw, or groups of drives. An interval
-    needs ``least`` frames, or `LEAST_GROUPS` groups, and more for more confidence.
+    Differences are of a drive's frames in their order, or of drives; NaN is left out. ``averaged``
+    has the values to average instead: of moments that several cameras saw, or of groups of drives.
+    An interval needs ``least`` frames, or `LEAST_GROUPS` groups, or more for a high ``confidence``.
     """
     defined = differences[~np.isnan(differences)]
     values = defined if averaged is None else averaged
     count = len(values)
     if unit == "drives":
-        # The least p-value of a sign-flip test is 2^(1 - n): 1/16 of five, too much for 95 %.
+        # The least p-value of a sign-flip test is 2^(1 - n): 1/16 for five groups is above 5 %.
         least = min(max(LEAST_GROUPS, math.floor(2 - math.log2(1 - confidence))), STUDENT_FROM)
     low = high = p = effective = error = degrees = None
     if count >= least and unit == "drives" and count < STUDENT_FROM:
@@ -154,7 +154,7 @@ def interval(
 
 
 def p_value(values: Floats, unit: Literal["frames", "drives"]) -> float:
-    """Return the two-sided p-value of a mean of 0, as `interval` computes it."""
+    """Return the two-sided p-value of the hypothesis that the mean is 0, as in `interval`."""
     if unit == "drives" and len(values) < STUDENT_FROM:
         return sign_flip_p(values)
     return mean_distribution(values, independent=unit == "drives").p_value()
@@ -163,11 +163,10 @@ def p_value(values: Floats, unit: Literal["frames", "drives"]) -> float:
 def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -> Difference:
     """Average the differences of a rate over a drive's frames, with an interval.
 
-    ``pairs`` are as of `roadeval.evaluation.tables.pair_rows`, with columns ``camera``,
-    ``stamp_ns``, the rate, and the base's rate with ``_base`` behind its name. Frames without a
-    difference are left out. The mean of several cameras is the mean of their means. Frames that
-    they took at the same time are no further evidence: a camera that is there twice changes
-    nothing, see `at_moments`.
+    ``pairs`` are rows from `roadeval.evaluation.tables.pair_rows`, with columns ``camera``,
+    ``stamp_ns``, the rate, and the base's rate, which ends in ``_base``. Frames without a
+    difference are left out. The mean over several cameras is the mean of their means. Frames of the
+    same time are no further evidence: a copy of a camera changes nothing, see `at_moments`.
     """
     stamps, base = pairs["stamp_ns"].to_numpy(), pairs[f"{rate}_base"].to_numpy()
     differences, camera = pairs[rate].to_numpy() - base, pairs["camera"].factorize()[0]
@@ -191,10 +190,10 @@ def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -
 def at_moments(cameras: Sequence[tuple[Sums, Floats]]) -> Floats:
     """Return a value for each moment, ``(T,)``; their mean is the mean of the cameras' means.
 
-    ``cameras`` have stamps and differences, ``(n,)`` each. The series varies as its mean does: at
-    moment t of T it is ``mean + T sum_i (d_i - mean_c) / (C n_c)`` over the frames i that were
-    taken then, each by a camera c of C, which has n_c frames. The moments are the frames of the
-    camera that has most; a frame of another camera belongs to the nearest.
+    ``cameras`` have stamps and differences, ``(n,)`` each. Values are scaled to vary as their mean
+    does: at moment t of T the value is ``mean + T sum_i (d_i - mean_c) / (C n_c)`` over the frames
+    i of that moment, where camera c of C took frame i and has n_c frames. The moments are those of
+    the camera with most frames; a frame of another camera belongs to the nearest moment.
     """
     clock = max((stamps for stamps, _ in cameras), key=len)
     order, start = np.argsort(clock, kind="stable"), clock.min()
@@ -210,7 +209,7 @@ def at_moments(cameras: Sequence[tuple[Sums, Floats]]) -> Floats:
 
 
 def group_means(drives: pd.DataFrame) -> Floats:
-    """Return the mean of each group's drives, ``(g,)``, for any order of the drives."""
+    """Return the mean of each group's drives, ``(g,)``, whatever the order of the drives."""
     ordered = drives[drives["mean"].notna()].sort_values(["group", "drive"])
     return ordered.groupby("group")["mean"].mean().to_numpy(float)
 
@@ -218,9 +217,9 @@ def group_means(drives: pd.DataFrame) -> Floats:
 def over_drives(drives: pd.DataFrame, confidence: float, rate: str = TESTED) -> Difference:
     """Average the differences of a rate over drives, in any order, with an interval.
 
-    Columns are ``drive``; ``group``, a name shared with other drives (a day or a route), else the
-    drive's own; and ``mean``, the mean difference on the drive, NaN if no frame has one. A group's
-    drives are averaged first, and every group counts alike.
+    Columns are ``drive``; ``group``, a name shared with other drives (a day or a route), or unique
+    to the drive; and ``mean``, the mean difference on the drive, NaN if no frame has one. A group's
+    drives are averaged first, and all groups have equal weights.
 
     Examples
     --------
@@ -245,9 +244,9 @@ def strata(
 ) -> Iterator[tuple[str, str, Difference]]:
     """Yield each tag, each of its values, and the difference on the drives that have the value.
 
-    ``drives`` are as of `over_drives`, with a column for each tag; a drive without a value is left
-    out of this division. A tag that does not divide the drives makes no parts. p-values are
-    corrected together.
+    ``drives`` are as in `over_drives`, with a column for each tag. A drive without a value is left
+    out for that tag, and a tag with one value for all drives is left out. p-values are corrected
+    for the number of differences.
     """
     drives = drives[drives["mean"].notna()]
     parts = {
@@ -264,9 +263,9 @@ def sign_flip_p(values: Floats, mean: float = 0.0) -> float:
     """Compute the exact two-sided p-value of the hypothesis that the mean is ``mean``.
 
     ``p = #{s : |sum s_i (x_i - mean)| >= |sum (x_i - mean)|} / 2^n``: if the mean is right and each
-    of the ``(n,)`` values is symmetric about it, all patterns of signs s are equally likely. The
-    sum stays as great after flipping a set of values exactly if the sum of the set is not above 0.
-    So sets are counted, as pairs from both halves [2]_; the time doubles with every second value.
+    of the ``(n,)`` values is symmetric about it, all patterns of signs s are equally likely. If the
+    signs of a set of values are flipped, the sum does not fall exactly if the set's sum is at most
+    0. Such sets are counted, as pairs from both halves [2]_: two more values double the time.
     `scipy.stats.permutation_test`, which tries the patterns, takes seconds and 1 GB for 20 values.
     """
     away = values - mean
@@ -289,9 +288,9 @@ def sign_flip_interval(values: Floats, confidence: float) -> tuple[float, float]
 
 
 def _lower_end(values: Floats, confidence: float) -> float:
-    """Return the least mean that is not rejected, by bisection, 1e-8 of the range too high at most.
+    """Return the least mean that is not rejected, by bisection to 1e-8 of the range, from above.
 
-    0 is tried first, so that rounding puts no end on its wrong side.
+    0 is tried first, so that rounding puts no end on the wrong side of 0.
     """
     low, high = float(values.min()), float(values.mean())
     if sign_flip_p(values, low) >= 1 - confidence:
@@ -324,11 +323,11 @@ def holm(family: Sequence[Difference]) -> list[Difference]:
 
 
 def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
-    """Correct p-values so that few of the findings are false.
+    """Correct p-values so that few findings are false.
 
     Among the findings whose corrected value is at most ``q``, a share of at most ``q`` is false on
     average: ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [4]_. That holds if the
-    tests are independent, as those of different drives are, or depend on each other positively.
+    tests are independent, as tests of different drives are, or depend on each other positively.
     None stands for a finding that was not tested: it is not counted and stays None.
     """
     tested = sorted((p, place) for place, p in enumerate(values) if p is not None)

@@ -1,7 +1,7 @@
 """A rate of a whole drive from a few labelled frames that were drawn at random.
 
-The interval is for the mean over exactly the frames of the drive, so only chance in the drawing
-enters, however alike neighbours are. ``docs/how-to/pick.md`` tells how often it holds.
+The interval is for the mean over exactly the frames of the drive. It allows only for chance in the
+drawing, whatever neighbours have in common. ``docs/how-to/pick.md`` tells how often it holds.
 """
 
 from __future__ import annotations
@@ -15,43 +15,43 @@ import numpy as np
 from roadeval.data.arrays import Floats, Sums
 
 REGRESSION_FROM: Final = 8
-"""Number of labels from which the relation of a rate to the frames' scores is learnt."""
+"""Least number of labels for a regression of the rate on the frames' scores."""
 FAR: Final = 2.0
-"""Scores so many interquartile ranges above the upper quartile belong to bursts. If a burst scores
-twice as high as other frames, the interval held in 74 % of draws with 3, in 93 % or more with 2;
-for drives without bursts it gets hardly wider."""
+"""Interquartile ranges above the upper quartile from which a score belongs to a burst. With bursts
+that score twice as high as other frames, the interval held in 74 % of draws for 3, and in at least
+93 % for 2; for drives without bursts it is hardly wider."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """The mean of a rate over all frames, from those that were drawn and labelled."""
+    """The mean of a rate over all frames, from frames that were drawn and labelled."""
 
     mean: float
     low: float | None
     high: float | None
-    """The ends of the interval; None if it takes more labels."""
+    """The ends of the interval; None if there are too few labels."""
     confidence: float
     labels: int
     frames: int
-    """Labelled frames that were drawn, and frames in all."""
+    """Number of labelled frames that were drawn, and of all frames."""
     to_halve: int | None
-    """Further labels, drawn at random, that would halve the interval; None if none can."""
+    """Number of further random labels that would halve the interval; None if no number does."""
     unseen: int = 0
-    """Frames far more in doubt than all others, if none of them was drawn: the interval includes
-    any rate that they may have."""
+    """Number of frames with far more doubt than all others, if none of them was drawn: the interval
+    includes any rate that they may have."""
 
     @property
     def missed(self) -> float:
-        """The share of frames that the draw misses entirely with a chance of 5 %."""
+        """The share of frames that contains no drawn frame with a probability of 5 %."""
         return float(1 - 0.05 ** (1 / self.labels))
 
 
 def draw_order(count: int, seed: int) -> Sums:
-    """Return ``count`` frames in an order; every beginning of it is a stratified random sample.
+    """Return an order of ``count`` frames; its beginnings are stratified random samples.
 
-    The first m frames are spread along the drive, and every frame is among them with probability
-    m / count exactly, so that further labels can follow the order. The order is that of the van der
-    Corput sequence, scrambled as in [1]_, on a ring of frames that is turned at random.
+    For every m the first m frames are spread along the drive, and each frame is among them with
+    probability m / count exactly, so further labels can follow the order. It is the van der Corput
+    sequence, scrambled as in [1]_, on a ring of frames that is turned at random.
 
     References
     ----------
@@ -92,8 +92,8 @@ def estimate(
     values
         ``(m,)``: the rate of each labelled frame that was drawn at random, in the drive's order.
     scores, every_score
-        ``(m,)`` of these frames, and ``(n,)`` of all frames: any number that was known before, for
-        example how unsure a mask is. If one is NaN, none is used.
+        ``(m,)`` of these frames, and ``(n,)`` of all frames: any number that was known before the
+        draw, such as the entropy of a mask. If one is NaN, no scores are used.
 
     References
     ----------
@@ -135,7 +135,7 @@ def estimate(
     lower, upper = np.quantile(every_score, (0.25, 0.75))
     far = upper + FAR * (upper - lower)
     unseen = int(np.count_nonzero(every_score > far))
-    if unseen < 2 or (scores > far).any():  # A single one is no burst.
+    if unseen < 2 or (scores > far).any():  # A single frame is no burst.
         unseen = 0
     seen = 1 - unseen / frames
     low, high = low * seen, high * seen + 1 - seen

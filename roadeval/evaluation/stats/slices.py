@@ -1,18 +1,18 @@
-"""Slices: frames, or parts of the image, in which a mask errs more; found, and then confirmed.
+"""Slices: frames, or parts of the image, with a higher ERR; first searched, then confirmed.
 
 A slice has at most two conditions: a measured quantity beyond a limit, a tag, a part of the image.
 Slices are searched on one half of a drive's blocks, or of the groups of drives, and the clearest
-are tested on the other half. A block is long enough to be nearly independent of its neighbours: a
-drive whose errors change slowly is cut into two.
+are tested on the other half. A block is long enough to be nearly independent of its neighbours: if
+errors change slowly, a drive has only two blocks.
 
 A drive's frames resemble each other, and so do their conditions. The difference of ERR inside and
 outside is a weighted sum of the frames' ERR, whose variance `mean_distribution` computes for these
-weights; pixels of one frame are compared as pairs. The errors that it models are halfway between
-those as they are and those without the difference: as they are, a real difference looks like slow
-errors; without it, slow errors look less slow. In a part of the image under a condition, ERR must
-also be higher than in the part without the condition, and than beside the part. Groups of drives
+weights; pixels of one frame are compared as pairs. Errors are modelled with half of the difference:
+with all of it, a real difference looks like slow errors; without it, slow errors look less slow. In
+a part of the image under a condition, ERR must also be higher than in the part without the
+condition, and higher than in the rest of the image. Groups of drives
 are independent: the contributions to a ratio of ERR inside to outside are tested by sign flips
-[1]_. An interval has the ratios that are not rejected.
+[1]_. An interval contains the ratios that are not rejected.
 
 References
 ----------
@@ -39,23 +39,23 @@ if TYPE_CHECKING:
 
 Unit = Literal["frames", "drives"]
 LEAST_FRAMES: Final = 40
-"""Frames of a drive that a search needs."""
+"""Least number of frames of a drive for a search."""
 LEAST_INSIDE: Final = {"frames": 10, "drives": 4}
-"""Frames, or groups of drives, that each half needs inside a slice, and outside."""
+"""Least number of frames, or of groups of drives, inside and outside a slice on each half."""
 BLOCKS: Final = 8
 """Greatest number of blocks of a drive."""
 INDEPENDENT: Final = 20
-"""Independent frames that a drive needs, and each block if there are more than two."""
+"""Least number of independent frames in a drive, and in each block if there are more than two."""
 QUANTILES: Final = (0.2, 0.4, 0.6, 0.8)
 """Quantiles of a quantity, on the searching half, that become its limits."""
 BEST: Final = 12
-"""Conditions that are combined with all others."""
+"""Number of conditions that are combined with all others."""
 LEAST_RATIO: Final = 1.25
 """Least ratio that is worth a sentence, on both halves."""
 GAIN: Final = 1.1
-"""Two conditions together must have a ratio this many times that of each of them alone."""
+"""Least ratio of two conditions together, as a multiple of the ratio of each alone."""
 SURE: Final = 0.05
-"""Greatest p-value on the searching half of slices that are tested on the other half."""
+"""Greatest p-value on the searching half with which a slice is tested on the other half."""
 TRIED: Final = 20
 """Greatest number of slices of each kind that are looked at closely."""
 TESTED_SLICES: Final = 2
@@ -63,6 +63,7 @@ TESTED_SLICES: Final = 2
 OVERLAP: Final = 0.5
 """Greatest share of common frames of two slices that are tested."""
 SHOWN: Final = 3
+"""Number of worst frames of a slice."""
 ON_CLASS: Final = "on "
 """Prefix of a part that is a class of the truth."""
 SCENES: Final = 30
@@ -83,7 +84,7 @@ class FrameCondition:
 class Slice:
     """Frames, or a part of their pixels, with a higher ERR than all others.
 
-    Numbers are of the half that confirms it.
+    Its numbers come from the confirming half.
     """
 
     conditions: list[FrameCondition]
@@ -100,7 +101,7 @@ class Slice:
     """ERR inside divided by ERR outside, with its interval."""
     p_holm: float
     worst: list[int] = field(default_factory=list)
-    """The frames with the highest ERR inside, of both halves, one a scene or a drive."""
+    """The frames with the highest ERR inside, of both halves, one for each scene or drive."""
     drives: list[str] = field(default_factory=list)
     """The drives of these frames; empty within one drive."""
 
@@ -120,10 +121,10 @@ def find_slices(
     frames
         The rows of ``frames`` of one final mask, in order.
     conditions
-        The key of a frame, ``stamp_ns``, and a column for each quantity, numbers or words; over
-        drives also ``group``.
+        A row for each frame: its key, ``stamp_ns``, and a column for each quantity, numbers or
+        words; over drives also ``group``.
     parts
-        The key of a frame, ``region``, ``wrong`` and ``N``: wrong and labelled pixels.
+        A row for each frame and part: its key, ``region``, ``wrong`` pixels, ``N`` labelled ones.
     """
     import pandas as pd
 
@@ -145,14 +146,14 @@ def find_slices(
         regions_of = {distances[0]: distances[:1]} if ends else {}
         for place, (near, _) in enumerate(ends[1:], 1):
             regions_of[f"{near}-{ends[-1][1]}m"] = distances[place:]
-        for band in bands if not ends else ():  # rows stand for distances where these are unknown
+        for band in bands if not ends else ():  # rows replace unknown distances
             first, last = (100 * (int(band[5:]) + more) // len(bands) for more in (0, 1))
             regions_of[f"rows_{first}-{last}"] = [band]
         regions_of |= {name: [name] for name in regions if name not in (*distances, *bands)}
         for part, names in regions_of.items():
             sums = [wide[n][names].to_numpy(float).sum(axis=1) for n in ("wrong", "N")]
             pixels[part] = np.array(sums)
-    if over_drives:  # every drive counts the same
+    if over_drives:  # all drives have equal weights
         of_drive = table.groupby("drive")["N"].transform("sum").to_numpy(float)
         pixels = {part: counts * (1 / of_drive) for part, counts in pixels.items()}
     search = _Search(table, columns, pixels, "drives" if over_drives else "frames")
@@ -162,8 +163,8 @@ def find_slices(
 class _Search:
     """The frames of a mask with their conditions, and wrong and labelled ``pixels`` by part.
 
-    These are ``(2, n)``. ``sides`` are ``(4, ..., units)``: wrong pixels inside and outside, and
-    labelled ones inside and outside, by frame, stretch, drive or group.
+    ``pixels`` are ``(2, n)``. ``sides`` are ``(4, ..., units)``: wrong pixels inside and outside,
+    and labelled ones inside and outside, by frame, stretch, drive or group.
     """
 
     def __init__(
@@ -184,7 +185,7 @@ class _Search:
         self._searching = self._block % 2 == 0
 
     def _stretches(self, count: int) -> Places:
-        """Return each frame's number among so many stretches of equal length."""
+        """Return the number of each frame's stretch, ``(n,)``, of ``count`` with equal length."""
         return self._frames * count // len(self._frames)
 
     def slices(self, confidence: float) -> list[Slice]:
@@ -202,16 +203,16 @@ class _Search:
             p = tested.p_holm
             if p is None or p >= 1 - confidence or _ratios(sides) < LEAST_RATIO:
                 continue
-            of = [c for place in places if (c := conditions[place])]
+            met = [c for place in places if (c := conditions[place])]
             frames = int((flags & ~self._searching).sum())
             wrong, rest, labelled, rest_labelled = sides.sum(axis=-1).tolist()
             rates, ratio = (wrong / labelled, rest / rest_labelled), float(_ratios(sides))
             ends, worst = self._interval(sides, ratio, confidence), self._worst(flags, part)
-            slices.append(Slice(of, part, frames, *rates, ratio, *ends, p, *worst))
+            slices.append(Slice(met, part, frames, *rates, ratio, *ends, p, *worst))
         return sorted(slices, key=lambda confirmed: -confirmed.ratio)
 
     def _conditions(self) -> Iterator[tuple[FrameCondition | None, Flags]]:
-        """Yield None, which all frames meet, and conditions, each with whether a frame meets it."""
+        """Yield None for all frames, then each condition, with flags of the frames that meet it."""
         yield None, np.ones(len(self._table), bool)
         for name in self._columns:
             column = self._table[name]
@@ -227,7 +228,7 @@ class _Search:
                 yield FrameCondition(name, "<", limit), values < limit
 
     def _choose(self, meets: Flags) -> Iterator[tuple[Flags, str, tuple[int, ...]]]:
-        """Yield the clearest slices of the searching half: flags, part and conditions' places."""
+        """Yield the clearest slices of the searching half: flags, part, places of conditions."""
         scores, ratios = self._score(meets, "")
         of_frames: list[tuple[float, str, tuple[int, ...]]]
         of_frames = [(score, "", (place,)) for place, score in enumerate(scores.tolist())]
@@ -258,9 +259,9 @@ class _Search:
                     yield flags, part, places
 
     def _score(self, meets: Flags, part: str) -> tuple[Floats, Floats]:
-        """Return a quick score, and the ratio, of each row of flags on the searching half.
+        """Return a quick score and the ratio of each row of flags on the searching half.
 
-        Both are 0 if the slice, or the rest, is too small, or errs less than the rest.
+        Both are 0 if the slice or the rest is empty, or ERR inside is not higher.
         """
         units = self._units if self._unit == "drives" else self._stretches(40)
         sides = self._sides(meets, part, self._searching, units)
@@ -270,21 +271,21 @@ class _Search:
         usable = np.isfinite(scores) & np.isfinite(ratios) & (ratios > 1)
         return np.where(usable, scores, 0), np.where(usable, ratios, 0)
 
-    def _sides(self, flags: Flags, part: str, rows: Flags, units: Places, of: str = "") -> Floats:
-        """Return the pixels inside, of ``part`` where ``flags`` are set, and all others of ``of``.
+    def _sides(self, flags: Flags, part: str, rows: Flags, units: Places, pool: str = "") -> Floats:
+        """Return the sides: ``part`` under ``flags`` is inside, the rest of part ``pool`` outside.
 
-        For drives they are weighted, see `_within_drives`.
+        Over drives they are weighted, see `_within_drives`.
         """
         starts = np.flatnonzero(np.diff(units[rows], prepend=-1))
         sides = []
-        for pixels, everywhere in zip(self._pixels[part], self._pixels[of], strict=True):
+        for pixels, everywhere in zip(self._pixels[part], self._pixels[pool], strict=True):
             inside = flags[..., rows] * pixels[rows]
             outside = everywhere[rows] - inside
             sides += [np.add.reduceat(side, starts, axis=-1) for side in (inside, outside)]
         return _within_drives(*sides) if self._unit == "drives" else np.array(sides)
 
     def _test(self, flags: Flags, part: str, rows: Flags) -> tuple[float, Floats]:
-        """Return the p-value of a slice on a half, 1 if it is too small, and its sides."""
+        """Return the p-value of a slice on a half, or 1 if it is too small, and its sides."""
         sides = self._sides(flags, part, rows, self._units)
         if self._unit == "drives":
             first = np.flatnonzero(np.diff(self._units[rows], prepend=-1))
@@ -304,7 +305,7 @@ class _Search:
         return max(_p_value(compared, self._unit) for compared in comparisons), sides
 
     def _interval(self, sides: Floats, ratio: float, confidence: float) -> tuple[float, float]:
-        """Return the least and the greatest ratio that is not rejected, to half a percent."""
+        """Return the least and the greatest ratio that are not rejected, to half a percent."""
         ends = []
         for end in (1.0, 20 * ratio):
             near, far = ratio, end
@@ -316,7 +317,7 @@ class _Search:
         return ends[0], ends[1]
 
     def _worst(self, flags: Flags, part: str) -> tuple[list[int], list[str]]:
-        """Return the frames with the highest ERR inside; and their drives, if there are several."""
+        """Return the frames with the highest ERR inside, and their drives if there are several."""
         wrong, labelled = self._pixels[part]
         rates = np.divide(wrong, labelled, out=np.zeros(len(wrong)), where=labelled > 0)
         of_drives = self._unit == "drives"
@@ -347,7 +348,7 @@ def _ratios(sides: Floats) -> Floats:
 
 
 def _contributions(sides: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the units' contributions to the difference of ERR, their factors, and ERR of all."""
+    """Return the units' contributions to the difference of ERR, their factors, and total ERR."""
     wrong, rest, labelled, rest_labelled = sides
     *_, inside, outside = sides.sum(axis=-1, keepdims=True)
     common = (wrong + rest).sum(axis=-1, keepdims=True) / (inside + outside)
@@ -357,7 +358,7 @@ def _contributions(sides: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _p_value(sides: Floats, unit: Unit, ratio: float = 1.0) -> float:
-    """Return the p-value of a ratio of ERR inside to outside."""
+    """Return the p-value of the hypothesis that ERR inside is ``ratio`` times ERR outside."""
     away = math.log(_ratios(sides) / ratio)
     modelled = ratio if unit == "drives" else ratio * math.exp(away / 2)
     sides = np.array([sides[0] / modelled, *sides[1:]])

@@ -13,7 +13,7 @@ import numpy as np
 
 from roadeval.data.arrays import Floats
 
-LEAST_NOISE: Final = 1e-6  # of a rate: what is below is rounding
+LEAST_NOISE: Final = 1e-6  # of a rate; less is rounding
 
 
 class ChangePoint(NamedTuple):
@@ -23,7 +23,7 @@ class ChangePoint(NamedTuple):
     before: int  # the first run of the old level
     run: int  # the first run of the new level or of a drift's rise; an outlier's run
     after: int  # the last run of the new level or of a drift's rise, inclusive
-    alarm: int  # the run by which it is noticed: a look at fewer runs does not name it
+    alarm: int  # the run at which it is detected; fewer runs do not show it
     change: float  # new level minus old level
 
 
@@ -41,9 +41,9 @@ def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
     ``values`` are the mean rates of drives in runs, ``(T, D)``, NaN where a run lacks a drive;
     ``weights``, ``(D,)``, say how much a drive counts; ``family`` series are searched together.
 
-    A look names a step if two levels fit better than one by h = ``8 / 3 log(365 family / 0.05)`` in
-    twice the log-likelihood of Student's t with 3 degrees. One run some 33 noises off gains that,
-    about ``exp(-3 h / 8)`` times a look by chance; ``benchmarks.history`` counts all that is named.
+    A run detects a step if two levels fit better than one by h = ``8 / 3 log(365 family / 0.05)``
+    in twice the log-likelihood of Student's t with 3 degrees. One run some 33 noises off reaches
+    that; by chance a run does so at a rate of about ``exp(-3 h / 8)``, see ``benchmarks.history``.
     """
     odds, steps = math.log(365 * family / 0.05), list[ChangePoint]()
     levels, jumps = np.full((2, len(values)), math.nan)
@@ -84,10 +84,10 @@ def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
 
 
 def _levels(values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Return each run's level, relative to the first, and how much wider than usual its noise is.
+    """Return each run's level relative to the first, and its noise relative to the usual: ``(T,)``.
 
     Each drive is compared with its own mean over n earlier runs, of rate minus level. That mean is
-    in doubt, so the drive counts ``n / (n + 10)``. How far drives lie apart tells the noise.
+    uncertain, so the drive has weight ``n / (n + 10)``. The spread of drives gives the noise.
     """
     there = ~np.isnan(values)
     rates, weight = np.where(there, values, 0.0), there * weights
@@ -108,7 +108,7 @@ def _levels(values: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 
 def _noises(jumps: Floats, odds: float) -> Floats:
-    """Return a run's noise: the median jump before it, or of the last 20; wide after a few."""
+    """Return each run's noise from the median of earlier jumps; it is wider after few jumps."""
     past, count = jumps[~np.isnan(jumps)], np.append(0, np.cumsum(~np.isnan(jumps)))
     number = np.arange(1, len(past) + 1)
     parts = [(np.sort(past[:n]), np.sort(past[max(n - 20, 0) : n])) for n in number.tolist()]
@@ -117,8 +117,8 @@ def _noises(jumps: Floats, odds: float) -> Floats:
 
 
 def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[int, Floats]:
-    """Return the first run at which two levels fit better by the limit, 0 if none; and noises."""
-    noises = 1.1 ** np.ceil(np.log(np.maximum(noises, 1e-9)) / math.log(1.1))  # Few fits.
+    """Return the first run at which two levels fit better by the limit, or 0, and its noises."""
+    noises = 1.1 ** np.ceil(np.log(np.maximum(noises, 1e-9)) / math.log(1.1))  # fewer fits
     first, spread = len(level), width
     for noise in dict.fromkeys(noises[np.isfinite(noises)].tolist()):
         looks = np.flatnonzero(noises[:first] == noise)
@@ -130,9 +130,9 @@ def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[
 
 
 def _fit(level: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the loss of runs up to i at the level of run j, its least for i, and the gain of two.
+    """Return the loss of runs up to i at run j's level, its least for i, and the gain of a step.
 
-    The loss is -2 log-likelihood. The gain of look i is that of the best place for a step.
+    The loss is -2 log-likelihood. The gain at run i is that of the best place for a step.
     """
     losses = 4 * np.log1p(((level[:, None] - level) / noise[:, None]) ** 2 / 3).cumsum(axis=0)
     later = ~np.tri(len(level), dtype=bool)
@@ -143,9 +143,9 @@ def _fit(level: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _change(level: Floats, noise: Floats, margin: float) -> tuple[int, bool]:
-    """Return the place at which the level changes, and whether a rise fits better from there on.
+    """Return the place where the level changes, and whether a drift from there fits better.
 
-    Least squares fit the rise of 3 or more runs; runs far from both levels have less weight.
+    A drift is fitted by least squares to 3 or more runs; outlying runs have less weight.
     """
     losses, least, gains = _fit(level, noise)
     place = int((losses[:-1] - least[:-1, None] - losses[-1]).max(axis=1).argmax()) + 1
