@@ -1,1 +1,1 @@
-"""Many drives: how they are found, where their files are, and who replays them."""
+"""Many drives: how they are found, where their files are, and which workers replay them."""

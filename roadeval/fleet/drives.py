@@ -117,7 +117,7 @@ class DriveEntry:
     name: str
     """Its name for people, safe to show; several drives may have the same."""
     group: str | None = None
-    """The same for drives that share a day or a route; None for a single drive."""
+    """Name that drives of one day or route share; None for a single drive."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Facts about it, such as ``{"weather": "rain"}``."""
     settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
@@ -164,7 +164,7 @@ class DriveEntry:
 
 
 def stem_of(source: str) -> str:
-    """Return the name of a drive: that of its folder, or of its file without the suffix."""
+    """Return the name of a drive: its folder's name, or its file's name without the suffix."""
     if is_url(source):
         return PurePath(last_part(source)).stem
     path = Path(source)
@@ -266,10 +266,10 @@ def groups_of(entries: Sequence[DriveEntry]) -> dict[str, str]:
 def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     """Return the fold of each drive, from 0; the drives of a group are in one fold.
 
-    The groups are shuffled by the digest of seed and name, which depends neither on their order nor
-    on the other groups, and dealt out in turn, so that the folds' numbers of groups differ by one
-    at most. ``groups`` has the group of each drive; a single drive is its own group. A `FleetError`
-    if there are fewer groups than folds.
+    The groups are sorted by a digest of seed and name, which depends neither on their order nor on
+    the other groups. The folds get them in turn, so that their numbers of groups differ by one at
+    most. ``groups`` has the group of each drive; a single drive is its own group. A `FleetError` if
+    there are fewer groups than folds.
 
     Examples
     --------
@@ -306,9 +306,9 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     A word is a log (a file of any name), a rosbag2 folder, a folder that is searched for logs and
     rosbag2 folders, a glob, a URL, or a manifest (``.toml``). The drives of a folder come in
     natural order, without hidden and incomplete files. A file of a rosbag2 folder stands for the
-    folder. A drive that is named twice counts once, with its description in a manifest, unless a
-    manifest names two of its cameras. A `RoadevalError` if a word leads to no drive, a manifest
-    cannot be used, or a drive has two descriptions.
+    folder. If a drive is named twice, it counts once, with its description in a manifest; but two
+    cameras that a manifest names are two drives. A `RoadevalError` if a word leads to no drive, a
+    manifest cannot be used, or a drive has two descriptions.
     """
     first_of: dict[tuple[str, str], DriveEntry] = {}
     bare: tuple[Any, ...] = (None, {}, {})

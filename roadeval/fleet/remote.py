@@ -51,15 +51,15 @@ PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 PART: Final = 64 << 10
-"""Fewest bytes of a part that nobody expected, and most between two that are read as one."""
+"""Least bytes of a part that was not expected; parts that are closer than this are read as one."""
 TAIL: Final = 128 << 10
-"""Bytes at the end that are read at once: the summary of a log of one gigabyte."""
+"""Bytes at the end that are read in one request: the summary of a log of one gigabyte."""
 AT_ONCE: Final = 16
-"""Parts that are read ahead at once; as many that were read are kept."""
+"""Number of parts that are read ahead; as many parts are kept after they were read."""
 PIECE: Final = 1 << 20
 """Most bytes of a part that is read ahead or kept."""
 ROOM: Final = 2 << 30
-"""Bytes of a result that are fetched, and unpacked, at most."""
+"""Greatest number of bytes of a result that are fetched, and that are unpacked."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
 _home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # until the process ends
 _POLL_S: Final = 0.2
@@ -87,7 +87,7 @@ _REASONS: Final = (
 def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> Path | RemoteLog:
     """Return the path of a drive, or the file behind its URL, for `roadeval.logs.log.open_log`.
 
-    Only the parts of the file that are needed are read. A `FleetError` if the URL is none, nothing
+    Only the needed parts of the file are read. A `FleetError` if the URL cannot be used, nothing
     can be read there, or the server is silent for ``patience_s`` seconds.
     """
     source = os.fspath(drive)
@@ -100,7 +100,7 @@ def open_source(drive: str | PathLike[str], patience_s: float = PATIENCE_S) -> P
 
 @cache
 def fetch_result(url: str) -> Path:
-    """Fetch the recording, or the zip of a result, behind a URL whole, and return its path.
+    """Fetch the whole recording, or zip of a result, behind a URL, and return its path.
 
     A `FleetError` if it cannot be fetched or unpacked, or has more than `ROOM` bytes.
     """
@@ -151,7 +151,7 @@ class _FileState(NamedTuple):
         return cls(meta["size"], meta["e_tag"], meta["last_modified"])
 
     def differs(self, other: Self) -> bool:
-        """Return whether a size, tag or time that both state differs."""
+        """Return whether size, tag or time differ; only values that both state are compared."""
         # A server that compresses weakens a tag. If a server states no time, obstore returns 1970.
         one, two = ((tag or "").removeprefix("W/") for tag in (self.tag, other.tag))
         times = self.modified, other.modified
@@ -177,16 +177,16 @@ class _RemoteFile(FarFile):
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
         place.traffic.total = self._size
         self._parts: list[_Part] = []
-        """Parts that were read or passed by, and then those that are expected."""
+        """Parts that were read or skipped, followed by those that are expected."""
         self._next = 0
-        """The position of the first of these that is expected."""
+        """The position of the first expected part."""
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + (self._size if whence == os.SEEK_END else 0)
         return self._at
 
     def read(self, size: int) -> bytes:
-        """Read at most so many bytes; a `FleetError` if the server sends others."""
+        """Read at most ``size`` bytes; a `FleetError` if the server sends too few or too many."""
         begin, end, content = self._at, min(self._at + size, self._size), bytearray()
         self._at = max(begin, end)
         while begin < end:
@@ -196,7 +196,7 @@ class _RemoteFile(FarFile):
         return bytes(content)
 
     def expect(self, parts: Iterable[tuple[int, int]]) -> None:
-        """Ask for the first parts that are not held; near ones are one, large ones several."""
+        """Ask for the first missing parts; join near ones to one, and divide large ones."""
         asked, expected = [part for part in self._parts if part.answer], list[_Part]()
         held = sorted((part.begin, part.end) for part in asked)
         for begin, stop in dict.fromkeys(parts):
@@ -221,7 +221,7 @@ class _RemoteFile(FarFile):
             self._ask_for(part)
 
     def _part(self, begin: int, end: int) -> _Part:
-        """Return a part that holds a byte, and perhaps those up to another."""
+        """Return a part that holds the byte at ``begin``, and perhaps all bytes up to ``end``."""
         place = next((n for n, p in enumerate(self._parts) if p.begin <= begin < p.end), -1)
         if 0 <= place < self._next + AT_ONCE:
             part = self._parts[place]
@@ -346,7 +346,7 @@ def _open_store(url: str, patience_s: float) -> _Place:
 
 
 def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: Any) -> Answer:
-    """Call a function of obstore; its errors become one line without the secrets of the URL.
+    """Call a function of obstore; an error becomes one line without the secrets of the URL.
 
     It runs in its own thread, as obstore does not notice Ctrl-C while it waits for a server.
     """

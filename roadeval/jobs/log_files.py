@@ -34,13 +34,13 @@ def info(
     drive
         The log.
     config
-        What a replay would be asked for.
+        The configuration of the replay that is planned.
     verify
-        Whether the log is read whole, so that all damage is found; a log of at most 50 MB on a disk
-        always is. Otherwise only the summary and the first messages of a log behind a URL are read,
-        if it has a summary.
+        Whether the whole log is read, so that all damage is found; a log of at most 50 MB on a disk
+        is always read whole. Otherwise only the summary and the first messages of a log behind a
+        URL are read, if it has a summary.
     on_progress
-        Called now and then while the log is read whole, in megabytes.
+        Called now and then while the whole log is read, in megabytes.
 
     Raises
     ------

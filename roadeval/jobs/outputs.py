@@ -42,8 +42,8 @@ class Outputs:
     def of(cls, settings: OutputSettings, drive: str) -> Outputs:
         """Return the places of a drive's results: from the settings, or by its name.
 
-        The folder has the name of the recording, if that is named: no folder of another run is
-        replaced.
+        If the settings name only the recording, the folder has its name, so that the folder of
+        another run is not replaced.
         """
         saved = Path(settings.save or Path("recordings", f"{drive}.rrd"))
         name = (saved.stem if settings.save else drive).strip(".") or drive
@@ -55,7 +55,7 @@ class Outputs:
 
     @contextmanager
     def holding(self, inputs: Iterable[AnyPath | None]) -> Iterator[None]:
-        """Hold them all, as `holding` does; at the end partial recordings of earlier runs go."""
+        """Hold them all, as `holding` does; at the end remove earlier partial recordings."""
         with holding(self.recording, self.mcap, folder=self.reports, inputs=inputs) as certain:
             ours = certain and self.recording
             there = find_partial(target_of(ours), hidden=False) if ours else []

@@ -11,7 +11,7 @@ class Progress:
     """How far a job is: ``done`` of ``total`` frames of ``stage``.
 
     ``stage`` is ``looking``, ``training``, ``replaying``, ``writing``, ``reading``, ``rendering``,
-    ``comparing`` or ``verifying``; ``total`` is None where it is not known.
+    ``comparing`` or ``verifying``; ``total`` is None if it is not known.
     """
 
     done: int
@@ -21,7 +21,7 @@ class Progress:
     """A sentence that the user should read now, not at the end."""
     unit: str = "frames"
     detail: str = ""
-    """A few words more, as how many drives have failed."""
+    """A few further words, such as the number of failed drives."""
 
 
 OnProgress = Callable[[Progress], None]

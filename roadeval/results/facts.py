@@ -141,8 +141,8 @@ class EstimateFacts:
     rates: dict[str, dict[str, Estimate]]
     """Rates of final masks by variant and name; empty if there is a problem."""
     apart: dict[str, dict[str, float | None]]
-    """ERR of the frames that were picked by rank and train no model, by frame and variant; no rate
-    counts them."""
+    """ERR of the frames that were picked by rank and train no model, by frame and variant; they are
+    not in the rates."""
     problem: str = ""
     """Reason why there are no rates."""
 
@@ -157,7 +157,7 @@ class LogFacts:
 
 @dataclass(frozen=True)
 class Reason:
-    """A sentence on the errors of a variant, and the frames that show what it says."""
+    """A sentence on the errors of a variant, and frames that are examples of it."""
 
     sentence: str
     frames: list[int]
@@ -312,9 +312,9 @@ class Facts(FactsFile):
     curves: Totals = field(default_factory=dict)
     """Key figures over all thresholds, by variant and stage with a probability of road."""
     thresholds: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """The thresholds of variants that learn nothing: the ``own`` one on the probability of road,
-    the ``threshold`` that is best on the training frames, ``ERR`` of all evaluated pixels at that
-    one, and the ``lines`` of settings that set it."""
+    """The thresholds on the probability of road, of variants that learn nothing: ``own`` is in use,
+    ``threshold`` is best on the training frames, ``ERR`` is that of all evaluated pixels at
+    ``threshold``, and ``lines`` are the settings that set it."""
     effects: list[Effect] = field(default_factory=list)
     """The paired differences of the drive."""
     oracles: dict[str, Totals] = field(default_factory=dict)

@@ -1,9 +1,9 @@
 """A fleet's folder: the results folders of its drives, and a cache of their tables in Parquet.
 
 Beside a drive's results lies a file that says how they were made; it is written last. A drive is
-done if that file is there and names the same log, settings, model and version. The frames of each
-drive are cached, and the scores that follow from them; a cache that is missing or old is made anew
-from the results.
+done if that file exists and names the same log, settings, model and version. The frames of each
+drive, and the scores that follow from them, are cached. If a cache is missing or old, it is made
+again from the results.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ WORST: Final = 50
 OF_A_DRIVE: Final = 3
 """Frames of a drive that are among its worst, at most."""
 APART_NS: Final = 3_000_000_000
-"""Neighbours fail alike: of frames less than this apart only the worst counts."""
+"""Neighbours fail alike: of frames that are closer than this only the worst counts."""
 CACHED: Final = ("frames", "regions", "scores", "worst", "classes")
 """Tables of each drive that are cached in folders of these names; ``regions`` of final masks. Older
 fleets have no ``classes``."""
@@ -131,7 +131,7 @@ class Made(FactsFile):
     fold: int | None = None
     model: str | None = None
     problem: str = ""
-    """Reason why the drive failed: there are no results then."""
+    """Reason why the drive failed; empty if there are results."""
     exit_code: int = 0
     seconds: float | None = None
     results: str = ""
@@ -149,7 +149,7 @@ class Made(FactsFile):
 
 
 def read_made(folder: Path, drive: str) -> Made | None:
-    """Read how a drive's results were made; None unless these are there, of this version."""
+    """Read how a drive's results were made; None if they are missing or of another version."""
     path = made_path(folder, drive)
     try:
         made = Made.parse(read_bounded(path), path)
@@ -164,9 +164,9 @@ def read_made(folder: Path, drive: str) -> Made | None:
 class FleetFolder:
     """Reads a fleet's folder, which may come from another machine and from anybody.
 
-    Nothing outside it is read or written, wherever its links and tables lead. It is about ``focus``
-    if it has that variant, or else about what it was made about. A `ResultsError` if
-    it is no fleet's folder, or one of another version.
+    Nothing outside it is read or written, even if its links and tables lead there. The focus is
+    ``focus`` if it has that variant, else the focus with which it was made. A `ResultsError` if
+    it is not a fleet's folder, or one of another version.
     """
 
     def __init__(self, folder: Path, focus: str | None = None) -> None:
@@ -205,7 +205,7 @@ class FleetFolder:
 
     @cached_property
     def drives(self) -> pd.DataFrame:
-        """The rows of ``drives``; the index are the drives' names in the fleet."""
+        """The rows of ``drives``, with the drives' names in the fleet as the index."""
         rows = self.table("drives").set_index("drive", drop=False)
         if not rows.index.is_unique:
             raise ResultsError(
@@ -247,7 +247,7 @@ class FleetFolder:
     def worst(self) -> pd.DataFrame:
         """The rows of ``worst``: the worst frames of the focus over all drives.
 
-        Those of another focus than the one of the replay have no pictures.
+        They have no pictures if the focus of the replay was another one.
         """
         rows, focus = self.table("worst"), self.facts.focus
         if focus is None or focus in values_of(rows, "variant"):
@@ -262,7 +262,7 @@ class FleetFolder:
 
     @cached_property
     def pictured(self) -> pd.DataFrame:
-        """The rows of ``worst`` of every drive, not of the worst frames of all alone."""
+        """The rows of ``worst`` of every drive, before the worst of all drives are chosen."""
         scored = self.focus_scores["drive"]
         return read_parquet([cached_path(self.path, "worst", drive) for drive in scored], "worst")
 
@@ -316,7 +316,7 @@ def of_drive(results: ResultsFolder, name: str, drive: str) -> pd.DataFrame:
 
 
 def cache(folder: Path, drive: str) -> None:
-    """Write the Parquet tables of a drive, unless those of its present results are there."""
+    """Write the Parquet tables of a drive, unless they were made from its present results."""
     path = results_path(folder, drive)
     files = {name: cached_path(folder, name, drive) for name in CACHED}
     summary = sha256_of(path / SUMMARY)
@@ -404,11 +404,11 @@ class FleetWriter:
     def _write_tables(
         self, members: Sequence[Member], digests: Mapping[str, str]
     ) -> tuple[dict[str, pd.DataFrame], list[Effect], dict[str, Degradations]]:
-        """Write every table, all of them before the first one takes its name.
+        """Write every table; the files get their names when all of them are written.
 
-        Returned are the tables from which the facts follow: ``drives``, and the rows of ``scores``
-        and ``effects`` of final masks on all pixels; and the differences within the only drive, if
-        just one was scored; and the disturbances of each drive that has any.
+        Return the tables from which the facts follow (``drives``, and the rows of ``scores`` and
+        ``effects`` of final masks on all pixels), the differences within the only scored drive
+        (empty for several drives), and the disturbances of the drives that have any.
         """
         tags = sorted({key for member in members for key in member.tags})
         rows = defaultdict[str, list[Any]](list)
@@ -453,7 +453,7 @@ class FleetWriter:
         rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
 
     def _read_cache(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
-        """Return the cached sums of drives; missing and old ones are made from their results."""
+        """Return the cached sums of drives; make missing and old ones from their results."""
         for drive in drives:
             try:
                 cache(self.folder, drive)
@@ -469,7 +469,7 @@ class FleetWriter:
         }
 
     def _read_made(self, drive: str, digests: Mapping[str, str]) -> Made:
-        """Return how a drive's results were made; a `ResultsError` if they are other ones."""
+        """Return how a drive's results were made; an error if they are gone, or other ones."""
         made = read_made(self.folder, drive)
         if made is None:
             raise ResultsError(

@@ -118,7 +118,7 @@ def group_changes(changes: Sequence[LineChange], focus: str) -> list[Event]:
 
 
 def describe_change(change: LineChange, when: str = "") -> str:
-    """Return how much a line changed, on which drives, and how sure that is of others."""
+    """Return how much a line changed, on how many drives, and how sure that is for others."""
     difference, kind = change.difference, change.step.kind
     verb, count = ("rose", difference.worse) if difference.mean > 0 else ("fell", difference.better)
     slowly = {"drift": " slowly", "outlier": " for this run alone"}.get(kind, "")

@@ -35,7 +35,7 @@ def describe_suspect(suspect: Mapping[str, Any]) -> str:
 
 
 def describe_suspects(suspects: pd.DataFrame) -> str:
-    """Return in which frames the label is clearly wrong, by the ranked suspects."""
+    """Return a sentence on the frames with clearly wrong labels, from the ranked suspects."""
     frames = sorted(suspects[suspects["clear"]]["frame"].tolist())
     if not frames:
         return "No label is clearly wrong."

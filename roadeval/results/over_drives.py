@@ -99,7 +99,7 @@ def summarise(
 def _degradations(
     by_drive: Mapping[str, Degradations], groups: Mapping[str, str], confidence: float
 ) -> Degradations:
-    """Return the means over drives; of a single drive its own."""
+    """Return the means over drives, or the values of the only drive."""
     import pandas as pd
 
     if len(by_drive) == 1:

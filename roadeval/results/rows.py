@@ -42,7 +42,7 @@ class Key(NamedTuple):
     camera: str
 
     def cells(self) -> str:
-        """Return both as cells of CSV, with a comma behind each."""
+        """Return both as cells of CSV, each followed by a comma."""
         return "".join(f"{_cell(text)}," for text in self)
 
 
@@ -54,7 +54,7 @@ def doubt_rows(frame: Frame, doubts: Iterable[Doubt]) -> dict[str, list[Row]]:
 
 
 def condition_rows(result: FrameResult, values: Sequence[float]) -> dict[str, list[Row]]:
-    """Return the row of ``conditions`` of an evaluated frame; none of another."""
+    """Return the row of ``conditions`` of an evaluated frame; no row for other frames."""
     when = result.frame.number, result.frame.stamp_ns
     return {"conditions": [(*when, *values)] if result.tallies else []}
 

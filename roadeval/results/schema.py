@@ -60,7 +60,7 @@ class Column(NamedTuple):
 
 LATER: Final = ("truth",)
 """Columns of counts that the first files of this format lack; they are read as 0, for unknown.
-Without any other column a file is damaged."""
+If any other column is missing, the file is damaged."""
 
 
 class TableSchema(NamedTuple):
@@ -148,7 +148,7 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
         Column("log_time_ns", Kind.TIME, "time at which the recorder logged it"),
         *_MASK,
         *_COUNTS_AND_RATES,
-        Column("truth", Kind.COUNT, "checksum of the truth's pixels, of all masks of the frame"),
+        Column("truth", Kind.COUNT, "checksum of the frame's truth, equal for all masks"),
     ),
     "regions": (
         *_IN_FRAME,
@@ -169,7 +169,7 @@ _OF_FRAMES: Final[dict[str, tuple[Column, ...]]] = {
             "disturbance", Kind.NAME, "its name, such as `fog-2`, `blur-0_5`, `exposure-minus1`"
         ),
         Column("kind", Kind.NAME, "the kind of the disturbance"),
-        Column("strength", Kind.NUMBER, "its strength; of `jpeg` the quality"),
+        Column("strength", Kind.NUMBER, "its strength; for `jpeg` the quality"),
         *_MASK,
         *_COUNTS_AND_RATES,
     ),
@@ -205,11 +205,11 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
     "changes": (
         *KEY,
         Column("from_variant", Kind.NAME, "variant of the mask before"),
-        Column("from_stage", Kind.NAME, "and its stage"),
+        Column("from_stage", Kind.NAME, "stage of the mask before"),
         Column("to_variant", Kind.NAME, "variant of the mask after"),
-        Column("to_stage", Kind.NAME, "and its stage"),
-        Column("repaired", Kind.COUNT, "pixels of the drive that are wrong before only", "pixels"),
-        Column("spoiled", Kind.COUNT, "pixels of the drive that are wrong after only", "pixels"),
+        Column("to_stage", Kind.NAME, "stage of the mask after"),
+        Column("repaired", Kind.COUNT, "pixels that only the mask after has right", "pixels"),
+        Column("spoiled", Kind.COUNT, "pixels that only the mask before has right", "pixels"),
         _LABELLED,
     ),
     "heat": (
@@ -218,9 +218,9 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
         Column("top", Kind.COUNT, "first row of the cell", "pixels"),
         Column("left", Kind.COUNT, "first column of the cell", "pixels"),
         Column("side", Kind.COUNT, "side of the cell", "pixels"),
-        Column("labelled", Kind.COUNT, "number of times that one of its pixels was labelled"),
-        Column("FP", Kind.COUNT, "number of times that one was a false positive"),
-        Column("FN", Kind.COUNT, "number of times that one was a false negative"),
+        Column("labelled", Kind.COUNT, "labelled pixels of the cell, over all frames"),
+        Column("FP", Kind.COUNT, "false positives of the cell, over all frames"),
+        Column("FN", Kind.COUNT, "false negatives of the cell, over all frames"),
     ),
     "probabilities": (
         *KEY,
@@ -232,16 +232,16 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
     "classes": (
         *KEY,
         _VARIANT,
-        Column("class", Kind.COUNT, "the label's value; of a colour red, green and blue in bytes"),
+        Column("class", Kind.COUNT, "value of the label, or a colour as bytes red, green, blue"),
         Column("name", Kind.TEXT, "its name, if known"),
         Column("truth", Kind.NAME, "`road`, `other` or `ignored`"),
         Column("pixels", Kind.COUNT, "pixels of the class", "pixels"),
-        Column("road", Kind.COUNT, "of these, pixels that the final mask calls road", "pixels"),
+        Column("road", Kind.COUNT, "pixels of the class that the final mask calls road", "pixels"),
         Column(
             "beside",
             Kind.COUNT,
-            "missed road whose nearest non-road is of this class, and lies within a 75th of the "
-            "image's diagonal",
+            "missed road whose nearest non-road pixel is of this class, and at most a 75th of the "
+            "image's diagonal away",
             "pixels",
         ),
         Column("frames", Kind.COUNT, "evaluated frames that have the class"),
@@ -254,16 +254,16 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
         Column("frames", Kind.COUNT, "evaluated frames on which the truth has it; 0 for sums"),
         Column("missing", Kind.COUNT, "number of these on which the mask misses it"),
         Column("value", Kind.NUMBER, "median of mask minus truth, outwards or ahead; or rate"),
-        Column("p95", Kind.NUMBER, "95th percentile of the size of the difference"),
-        Column("low", Kind.NUMBER, "least value over stances of the camera"),
-        Column("high", Kind.NUMBER, "greatest value over stances of the camera"),
+        Column("p95", Kind.NUMBER, "95th percentile of the absolute difference"),
+        Column("low", Kind.NUMBER, "least value if the camera stands or looks a little otherwise"),
+        Column("high", Kind.NUMBER, "greatest value in that case"),
     ),
 }
 
 _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
     "drives": (
         *KEY,
-        Column("name", Kind.TEXT, "name of its log for people; two may have the same"),
+        Column("name", Kind.TEXT, "name of the log; two drives may have the same name"),
         Column("source", Kind.TEXT, "path or URL of the log"),
         Column("group", Kind.TEXT, "name shared by drives of one day or route"),
         Column("fold", Kind.COUNT, "the fold whose model scored it; empty without folds"),
@@ -287,10 +287,10 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         Column("labelled", Kind.COUNT, "frames that have a truth"),
         Column("trained_on", Kind.COUNT, "frames left out because a model learnt from them"),
         Column("evaluated", Kind.COUNT, "frames that were scored"),
-        Column("losses", Kind.TEXT, "losses of the log, a sentence a line"),
-        Column("warnings", Kind.TEXT, "warnings, a sentence a line"),
+        Column("losses", Kind.TEXT, "losses of the log, one sentence a line"),
+        Column("warnings", Kind.TEXT, "warnings, one sentence a line"),
         Column(
-            "misfits", Kind.TEXT, "truth or masks that do not fit the images, a sentence a line"
+            "misfits", Kind.TEXT, "truth or masks that do not fit the images, one sentence a line"
         ),
         Column("verdict", Kind.TEXT, "the verdict on this drive alone"),
         Column("model", Kind.NAME, "SHA-256 of the model file; empty if it trained its own"),
@@ -309,7 +309,7 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         Column("episode_seconds", Kind.NUMBER, "their total length", "s"),
         Column("flicker", Kind.RATE, "share of pixels that change from frame to frame"),
         Column("truth_flicker", Kind.RATE, "share of pixels that change in the truth"),
-        Column("truth", Kind.COUNT, "checksum of the truth of all frames, of `all`; 0 is unknown"),
+        Column("truth", Kind.COUNT, "checksum of all frames' truth for region `all`, else 0"),
     ),
     "effects": (
         *KEY,
@@ -319,7 +319,7 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
         Column("metric", Kind.NAME, "the rate"),
         Column("mean", Kind.RATE, "mean of the frames' differences"),
         Column(
-            "standard_error", Kind.NUMBER, "standard error of the mean; allows for alike frames"
+            "standard_error", Kind.NUMBER, "standard error of the mean, adjusted for alike frames"
         ),
         Column("low", Kind.RATE, "lower end of its interval"),
         Column("high", Kind.RATE, "upper end"),
@@ -340,20 +340,20 @@ _OF_DRIVES: Final[dict[str, tuple[Column, ...]]] = {
 }
 
 _ROWS: Final = {
-    "frames": "A row per evaluated frame, variant and stage; in a fleet, in a folder per drive.",
+    "frames": "A row per evaluated frame, variant and stage; a fleet has a file for each drive.",
     "regions": "A row per evaluated frame, variant, stage and region.",
     "oracles": "A row per evaluated frame, variant, stage replaced by the truth and later stage.",
-    "disturbances": "A row per evaluated frame, disturbance and variant: its final mask then.",
+    "disturbances": "A row per evaluated frame, disturbance and final mask.",
     "disagreements": "A row per evaluated frame and pair of final masks.",
-    "unlabelled": "A row per frame without truth and variant: how doubtful its mask is.",
-    "conditions": "A row per evaluated frame: what its image and its truth are like.",
-    "edges": "A row per evaluated frame, final mask and place where the road ends, in metres.",
+    "unlabelled": "A row per variant and frame without truth: how uncertain the mask is.",
+    "conditions": "A row per evaluated frame: measures of its image and its truth.",
+    "edges": "A row per evaluated frame, final mask and edge or end of the road, in metres.",
     "windows": "A row per window of consecutive evaluated frames, variant and stage.",
-    "changes": "A row per mask and the one before: stage to stage, final mask to final mask.",
-    "heat": "A row per variant and cell with an error or without a label, and for the last cell.",
+    "changes": "A row per pair of masks: of consecutive stages, or of two final masks.",
+    "heat": "A row per variant and cell with an error or a missing label, and for the last cell.",
     "probabilities": "A row per variant, stage and level of its road probability, for curves.",
     "classes": "A row per final mask and class of the truth, where the truth has classes.",
-    "metres": "A row per final mask and measure on the ground; see the how-to on metres.",
+    "metres": "A row per final mask and measure on the ground; the page on metres explains them.",
     "drives": "A row per drive and camera, scored or not; a column `tag_<key>` for each tag.",
     "scores": "A row per drive, camera, variant, stage and region.",
     "effects": "A row per drive, camera, difference between two masks, and rate.",

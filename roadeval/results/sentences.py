@@ -17,7 +17,7 @@ from roadeval.runtime.sentence import Sentence
 FINE: Final = 0.005
 """Levels that differ by less have two digits."""
 ROUNDING: Final = 5e-4
-"""If the difference of two levels is farther from the paired one, they are of other frames."""
+"""Two levels whose difference is farther from the paired difference are of other frames."""
 MARK: Final = "*"
 """Marks a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
@@ -140,7 +140,7 @@ def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
 
 
 def notes(finals: Mapping[str, Mapping[str, float]], focus: str | None = None) -> Iterator[str]:
-    """Yield what a person should know of a frame, by the rates of final masks.
+    """Yield notes on a frame for a person, by the rates of final masks.
 
     With a ``focus`` they are about this variant alone, beside its rates.
     """

@@ -42,7 +42,7 @@ NAMED: Final = 5
 
 
 def verdict_on(facts: Facts | FleetFacts) -> str:
-    """Return the verdict on a drive or a fleet, after what does not fit there."""
+    """Return the verdict on a drive or a fleet, after the sentences on what does not fit."""
     more: dict[str, Any] = {"focus": facts.focus}
     if isinstance(facts, Facts) and not facts.cameras:
         more |= {"thresholds": facts.thresholds}
@@ -55,7 +55,7 @@ AnyFacts = TypeVar("AnyFacts", bound=Facts | FleetFacts)
 
 
 def with_focus(facts: AnyFacts, focus: str, doubts: pd.DataFrame | None = None) -> AnyFacts:
-    """Return facts with another focus, and the verdict on it; nothing is replayed for it.
+    """Return facts with another focus and the verdict on it, without a new replay.
 
     ``doubts`` are the rows of ``unlabelled``. The facts of a rig's cameras stay as they are.
     """
@@ -77,9 +77,9 @@ def verdicts(facts: Facts | FleetFacts, doubts: pd.DataFrame | None = None) -> d
 def describe_doubts(
     rows: pd.DataFrame, differing: Mapping[str, Mapping[str, float]]
 ) -> UnlabelledFacts | None:
-    """Return which frames without truth to look at; None without any.
+    """Return which frames without truth to look at; None if there are no such frames.
 
-    ``rows`` are those of ``unlabelled`` of one variant; for ``differing`` see `UnlabelledFacts`.
+    ``rows`` are the rows of ``unlabelled`` of one variant; for ``differing`` see `UnlabelledFacts`.
     """
     if not len(rows):
         return None
@@ -102,12 +102,12 @@ def verdict(
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
-    The focus is by default that of `focus_of`. They say how wrong it is and how; how it compares
-    with the baseline and with the filter's absence; which variant is best, if it is another; and
-    what to do next. ``totals`` are rates by variant and stage, empty if nothing was scored;
-    ``effects`` are of final masks at least; ``thresholds`` are the best ones, as in
-    `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells which frames to look
-    at. ``estimated`` are rates of the whole drive, from frames that were drawn at random.
+    The default focus is that of `focus_of`. The verdict says how wrong it is and how; how it
+    compares with the baseline and with the same method without the filter; which variant is best,
+    if it is another; and what to do next. ``totals`` are rates by variant and stage, empty if
+    nothing was scored; ``effects`` include those of final masks; ``thresholds`` are the best ones,
+    as in `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells which frames
+    to look at. ``estimated`` are rates of the whole drive, from frames drawn at random.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
@@ -194,7 +194,7 @@ def _no_interval(change: Difference) -> str:
 
 
 def _points(change: Difference, name: str, *, alone: bool = False) -> str:
-    """Return a difference of error rates in points; not ``alone`` with what it is elsewhere.
+    """Return a difference of error rates in points, with its interval unless ``alone``.
 
     >>> _points(Difference(-0.02, -0.05, 0.01, 0.2, 0.95, "frames", 91), "blind")
     '2.0 points (may be chance) better than blind'
@@ -213,8 +213,8 @@ def _points(change: Difference, name: str, *, alone: bool = False) -> str:
 def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, Rates]) -> str:
     """Return how a new mask compares with a base, here and on other frames or drives.
 
-    ``ends`` are the rates of the base and of the new mask, which are named if their difference is
-    that of the same frames or drives.
+    ``ends`` are the rates of the base and of the new mask. The text names them if their difference
+    is ``change``, so that they are of the same frames or drives.
 
     >>> change = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 9)
     >>> print(describe_change(change, "new", "old", ({"ERR": 0.05}, {"ERR": 0.03})))

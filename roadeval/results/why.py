@@ -157,7 +157,7 @@ def describe_slice(failure: Slice) -> str:
 
 
 def describe_place(failure: Slice) -> str:
-    """Return which frames, and which part of them, a slice is."""
+    """Return the frames of a slice, and its part of the image, in words."""
     conditions = " and ".join(map(describe_condition, failure.conditions))
     frames = f"in frames {conditions}" * bool(conditions)
     return ", ".join(filter(None, (frames, describe_part(failure.part))))
@@ -166,7 +166,7 @@ def describe_place(failure: Slice) -> str:
 def describe_disturbances(disturbances: Degradations, focus: str | None) -> str:
     """Return which disturbance harms the focus most, and how many do; empty without any.
 
-    A variant that was not disturbed gives way to the first one that was.
+    If the focus was not disturbed, the sentence is about the first variant that was.
     """
     if not disturbances:
         return ""

@@ -21,10 +21,10 @@ class TrainingSettings:
     adapt: Let the model learn further from the drive's first frames, which are then not evaluated.
         The result then says nothing about drives that the model has not seen. The reference patch
         alone is used only if ``source`` is ``patch``: it may make the model worse.
-    source: ``auto``: the log's truth if it has one, else the reference patch; ``truth`` or
-        ``patch`` insists.
-    frames: Labelled frames to train on, which are never evaluated. All frames count for ``patch``.
-        They stay in memory.
+    source: ``auto``: the log's truth if it has one, else the reference patch; ``truth``: only the
+        truth; ``patch``: only the patch.
+    frames: Labelled frames to train on, which are never evaluated; for ``patch`` any frames. They
+        stay in memory.
     placement: The ``first`` labelled frames, or some ``spread`` along the drive at equal distances.
         These show all its light and places: the result then holds for a drive with labels here and
         there, not for frames after the labelled ones.
@@ -34,7 +34,7 @@ class TrainingSettings:
     pixels_per_class: Road pixels, and non-road pixels, drawn from each training frame.
     max_pixels: Greatest number of pixels of all frames and classes together: the SVM's training
         time grows with its square.
-    seed: Seed of the draw. Another seed draws other pixels, and gives other rates.
+    seed: Seed of the random choice of pixels. Another seed gives other rates.
     patch: Self-supervision: the trapezoid in front of the vehicle that counts as road.
     horizon: Self-supervision: pixels above this share of the height are not road.
     far: Self-supervision: pixels below the horizon and nearer to the patch than this are road, all

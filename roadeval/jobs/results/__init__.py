@@ -1,1 +1,1 @@
-"""Results opened: reported, compared, inspected."""
+"""Work with results: reports, comparisons, clips, and frames to look at."""

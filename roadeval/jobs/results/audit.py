@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PRESET: Final = "robust"
-"""A method that is often wrong finds few labels that are."""
+"""A method that is often wrong finds few wrong labels, so the default is the best preset."""
 SUSPECTS: Final = "suspects"
 """The folder with a picture of each label that looks wrong."""
 
@@ -44,7 +44,7 @@ class Audit:
     """The labels of a drive that look wrong."""
 
     suspects: pd.DataFrame
-    """A row for each, the worst first: `Suspect`, whether it is ``clear``, ``rank``, and why."""
+    """A row for each label, the worst first: `Suspect`, ``clear`` or not, ``rank``, and why."""
     labels: int
     """Number of labels that were examined."""
     sentences: list[str]

@@ -47,7 +47,7 @@ class Compared:
     comparison: Comparison
     judgements: tuple[Judgement, ...]
     sides: tuple[Side, ...]
-    """The results with the one drive that is compared; none where several are."""
+    """The results with the only drive that is compared; empty for several drives."""
     recordings: Mapping[str, DriveResult]
     """By the results' labels; a folder has none."""
     lost: tuple[str, ...] = ()
@@ -75,12 +75,12 @@ def compare(
     ----------
     results
         Recordings, results folders or fleets' folders. If there is only one, its variants are
-        compared. The base may be a folder of many runs: their last good one, see
+        compared. The base may be a folder of many runs, of which the last good run is used, see
         `roadeval.history`.
     variants
-        For several results: only these, where ``a=b`` compares the base's ``a`` with the others'
-        ``b``. For a single one: these, with the first as the base; by default all, ``unfiltered``
-        first.
+        The variants to compare. For several results ``a=b`` compares ``a`` of the base with ``b``
+        of the others. For a single result the first variant is the base; by default all are
+        compared, with ``unfiltered`` as the base.
     fail_if
         Conditions, see `roadeval.evaluation.comparison.conditions`.
     """

@@ -1,4 +1,4 @@
-"""Frames of a result for a report or a page: which, with their pictures and facts."""
+"""The choice of frames for a report or a page, with their pictures and facts."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class FramePicker:
     def worst(self) -> list[NotableFrame]:
         """Return the worst frames of the focus, one a scene, all worse than the mean.
 
-        Without truth they are those most in doubt, if they have pictures.
+        Without truth they are the most uncertain frames that have pictures.
         """
         if self._focus is None:
             unlabelled = self._result.facts.unlabelled

@@ -195,7 +195,7 @@ def find_results(path: Path) -> list[Path]:
 
 
 def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path, Sequence[str]]:
-    """Return the first place's result, or of its runs the newest that no lasting step made worse.
+    """Return the first place's result, or the newest of its runs before a lasting step to worse.
 
     Results of the other places are no runs of the folder. Returned with it are the runs that could
     not be read, and why. A `RoadevalError` if none can be read.

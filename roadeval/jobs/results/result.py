@@ -83,7 +83,7 @@ class DriveResult:
     """The result of a replay, from an ``.rrd`` or a results folder; for a rig that of a ``camera``.
 
     Its focus is ``focus`` if it has that variant, else the focus with which it was made. A
-    `RoadevalError` if it is neither, or by another program or format.
+    `RoadevalError` if the path is neither, or was written by another program or format.
     """
 
     def __init__(self, path: str | Path, camera: str = "", focus: str | None = None) -> None:
@@ -239,7 +239,7 @@ class DriveResult:
 
     @cached_property
     def pictured(self) -> tuple[int, ...]:
-        """The frames whose pictures are there; none of a folder.
+        """The frames that have pictures; empty for a results folder.
 
         A run may have kept few, and a killed one may have written some layers of its last frames
         and not others: those are left out.
@@ -520,7 +520,7 @@ def input_digests(facts: Facts) -> dict[str, str]:
 
 
 def _short_digest(value: Any, *keys: str) -> str:
-    """Return the first letters of the digest that lies at some keys; empty where none does."""
+    """Return the first letters of the digest at some keys of a tree; empty if there is none."""
     for key in keys:
         value = value.get(key) if isinstance(value, Mapping) else None
     return value[:8] if isinstance(value, str) else ""

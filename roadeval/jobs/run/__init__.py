@@ -1,1 +1,1 @@
-"""Runs: a log or many replayed, and models trained."""
+"""Runs: replays of one log or many, and the training of models."""

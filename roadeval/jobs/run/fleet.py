@@ -69,9 +69,9 @@ def replay_fleet(
 ) -> FleetOutcome:
     """Replay many drives, and write the tables of all of them.
 
-    The folder is the state: a drive whose results are there, made of the same log, settings, model
-    and version, is not replayed again, unless it failed. A `RoadevalError` if there is no drive, or
-    the folder or the engine cannot be used.
+    A drive is not replayed again if the folder has its results, made from the same log, settings,
+    model and version; a failed drive is tried again. A `RoadevalError` if there is no drive, or the
+    folder or the engine cannot be used.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def replay_fleet(
     config
         Every option, those of the fleet included (`RunConfig.fleet`).
     executor
-        Who replays the drives; by default Dask's workers, as `RunConfig.fleet` says.
+        Runs the replays; by default Dask's workers, as `RunConfig.fleet` says.
     on_progress
-        Called in the caller's thread as drives are done.
+        Called in the caller's thread whenever a drive is done.
     """
     commit, config = current_commit(), (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in list_paths(drives)])
@@ -127,7 +127,7 @@ class FleetRun:
     config: RunConfig
     on_progress: OnProgress
     executor: Executor | None
-    """Who does the tasks; None until there is one, and Dask's workers are started then."""
+    """Runs the tasks; None until the first task, for which Dask's workers are started."""
     workers: int = 1
     done: dict[str, Done] = field(default_factory=dict)
     """Reports of the drives that are done, by their IDs."""
@@ -163,7 +163,7 @@ class FleetRun:
             yield DriveTask(self.folder, entry, config, software(config), digest)
 
     def _waiting(self, tasks: Sequence[DriveTask]) -> list[DriveTask]:
-        """Return the tasks of drives that are not done. A URL is looked at by its worker."""
+        """Return the tasks of drives that are not done. Workers check drives behind URLs."""
         waiting = []
         for task in tasks:
             # A worker waits for a run that claims it, or clears away what a killed one left.
@@ -238,7 +238,7 @@ class FleetRun:
                 future.cancel()
 
     def _reason(self, error: Exception, doing: str) -> str:
-        """Return why a task has failed; an error that ends the whole run is raised."""
+        """Return why a task has failed; raise an error that ends the whole run."""
         if isinstance(error, RoadevalError):
             raise error
         if isinstance(error, CancelledError):

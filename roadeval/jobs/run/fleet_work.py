@@ -1,4 +1,4 @@
-"""The work of a fleet's workers: a drive replayed, a model trained for a fold."""
+"""The work of a fleet's workers: replay a drive, or train the model of a fold."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ from roadeval.training.model import save_model
 
 MODELS: Final = "models"
 TRAINING_DRIVES: Final = 20
-"""Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups in turn.
-Their training frames are held decoded."""
+"""Greatest number of drives that the model of a fold learns from, drawn by ``training.seed`` from
+the groups in turn. Their decoded training frames stay in memory."""
 FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 
 
@@ -68,14 +68,14 @@ class DriveTask:
     """The task of a worker that replays a drive; travels to another process."""
 
     folder: Path
-    """The fleet's: the same path for every worker."""
+    """The fleet's folder, which has the same path for every worker."""
     entry: DriveEntry
     config: RunConfig
     """Configuration of this drive, its model included."""
     software: Mapping[str, str]
     """Software of the program that asks, see `roadeval.jobs.run.prepared.software`."""
     model: str = ""
-    """SHA-256 of the model file; empty where the drive trains its own."""
+    """SHA-256 of the model file; empty if the drive trains its own model."""
     fold: int | None = None
     """The fold whose model it is; None without folds."""
 
@@ -112,8 +112,8 @@ class Done:
 def replay_drive(task: DriveTask) -> Done:
     """Replay a drive into the fleet's folder, unless it is done already.
 
-    While another command works on the same drive, this one waits for it. A `FleetError` if the
-    fleet's disk fails, or the worker has other software: `Done` names any problem of the drive
+    If another command works on the same drive, wait for it. A `FleetError` if the fleet's disk
+    fails, or the worker has other software than the command; `Done` names any problem of the drive
     itself.
     """
     _check_software(task.software, task.config)
@@ -129,7 +129,7 @@ def replay_drive(task: DriveTask) -> Done:
 
 
 def find_valid(task: DriveTask) -> Made | None:
-    """Return how a drive was made that needs not be replayed: it is whole, nothing has changed."""
+    """Return how a complete and unchanged drive was made; None if it must be replayed."""
     made = read_made(task.folder, task.entry.id)
     if made is None or made.problem or made.asked != task.asked:
         return None
@@ -148,7 +148,7 @@ def report_drive(folder: Path, made: Made, *, repeated: bool = False) -> Done:
 
 
 def mark_failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
-    """Return that a drive could not be used, and why; files of earlier replays are removed."""
+    """Remove files of earlier replays of a drive, and return why it could not be used."""
     _remove(task, RESULTS, PICTURES, RECORDINGS, *CACHED)
     stamp = stamp_files(task.entry, task.config)
     how = task.fold, task.model or None
@@ -158,8 +158,8 @@ def mark_failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
 def stamp_files(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
     """Return facts that quickly show whether a drive's log, or masks beside it, changed.
 
-    Plain data by file: size and times, or of a URL size and tag. None where it cannot be looked at:
-    the error is reported where it is read.
+    They are size and times of each file, or size and tag behind a URL. None if a file cannot be
+    looked at: the error is reported when the drive is read.
     """
     beside = [labels for labels in (config.truth, *config.masks.values()) if labels.path]
     try:
@@ -167,7 +167,7 @@ def stamp_files(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
         stamps: dict[str, Any] = {}
         if entry.path is None:
             size, tag = stamp(entry.source, config.run.patience_s)
-            # Without a tag nothing shows: it is equal to no other.
+            # Without a tag a change cannot be noticed, so the value is equal to no other.
             stamps[entry.id] = [size, tag or secrets.token_hex()]
         else:
             files += sorted(entry.path.iterdir()) if entry.path.is_dir() else [entry.path]
@@ -225,7 +225,7 @@ def _try_replay(task: DriveTask) -> Made:
 
 
 def _remove(task: DriveTask, *folders: str) -> None:
-    """Remove files of a drive that earlier replays of something else have left in some folders."""
+    """Remove a drive's files in some folders, which replays of another log or settings left."""
     folder, drive = task.folder, task.entry.id
     recording = recording_path(folder, drive)
     paths = {
@@ -265,7 +265,7 @@ def ending_the_run(folder: Path) -> Iterator[None]:
 
 
 def _disk_failure(error: BaseException | None) -> OSError | RecordingError | None:
-    """Return the error that says that nothing can be written any more; None if none does."""
+    """Return the error in a chain of errors after which nothing can be written; None if none is."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in FULL:
             return error
@@ -283,7 +283,7 @@ class FoldTask:
     fold: int
     """The fold whose drives the model will score."""
     candidates: tuple[tuple[DriveEntry, RunConfig], ...]
-    """Drives of the other folds, with their configurations, in the order of being asked."""
+    """Drives of the other folds, with their configurations, in the order of trial."""
     config: RunConfig
     software: Mapping[str, str]
     """Software of the program that asks."""
@@ -306,9 +306,9 @@ class FoldModel:
 
 
 def train_fold(task: FoldTask) -> FoldModel:
-    """Train the model of a fold, unless it is there and nothing has changed.
+    """Train the model of a fold, unless it exists and nothing has changed.
 
-    A drive without truth, or one that cannot be used, is passed by, and the next one is asked. A
+    A drive without truth, or one that cannot be used, is skipped, and the next one is tried. A
     `FleetError` if the fleet's disk fails, or the worker has other software.
     """
     _check_software(task.software, task.config)
@@ -327,7 +327,7 @@ def train_fold(task: FoldTask) -> FoldModel:
 
 
 def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
-    """Train on as many drives as are wanted; why others gave no frames stands beside the model."""
+    """Train on enough drives; the file beside the model says why others gave no frames."""
     held = HeldFrames()
     drawn: dict[Path, Sequence[Frame]] = {}
     passed: dict[str, str] = {}
@@ -392,7 +392,7 @@ class WorstPictures:
         rivals = [*near, *(rest[-1:] if len(rest) == OF_A_DRIVE else [])]
         if any(rival[0] >= error for rival in rivals):
             return
-        # Painted when they are small: most are soon replaced by a worse frame's.
+        # Pictures are painted when they are small: most are soon replaced by a worse frame's.
         image, errors_of = shrink(frame.image, WIDTH), result.errors[variant].array
         small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content

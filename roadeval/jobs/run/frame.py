@@ -47,7 +47,7 @@ def run_variant(
 ) -> VariantResult:
     """Run a chain on a frame; with truth also with each stage replaced by its oracle.
 
-    ``known`` is what the frame's variants share, see `Chain.run`.
+    ``known`` are intermediate results that the frame's variants share, see `Chain.run`.
     """
     results = tuple(chain.run(view, known))
     outputs = [result.output for result in results]
@@ -84,15 +84,15 @@ def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:
 def run_frame(
     image: Rgb, model: Model | None, config: RunConfig | None = None, *, variant: str = FILTERED
 ) -> VariantResult:
-    """Run one variant on one image, with all layers: the notebook's way in.
+    """Run one variant on one image, and return all its layers, for use in a notebook.
 
     Parameters
     ----------
     image
         ``(H, W, 3)`` uint8 RGB.
     model
-        What `roadeval.train` or `roadeval.load_model` gave; None for a variant that learns nothing,
-        as a network.
+        The result of `roadeval.train` or `roadeval.load_model`; None for a variant that learns
+        nothing, such as a network.
     config
         The configuration that the model was trained with; the preset ``paper`` by default.
 

@@ -52,13 +52,13 @@ class Outcome:
     losses: tuple[str, ...]
     files: tuple[Path, ...]
     tracebacks: tuple[str, ...] = ()
-    """Where in their code stages failed that are among the losses."""
+    """Tracebacks of the stages that failed, which are among the losses."""
     metres: tuple[Mapping[str, Any], ...] = ()
-    """The rows of ``metres``; empty of a rig, and of a camera that is not known."""
+    """The rows of ``metres``; empty for a rig, and if the camera is not known."""
     errors: tuple[float, ...] = ()
-    """ERR of the focus frame by frame; empty of a rig."""
+    """ERR of the focus frame by frame; empty for a rig."""
     traffic: Traffic | None = None
-    """The requests and bytes that a log elsewhere has cost; None for one on a disk."""
+    """The requests and bytes for a log behind a URL; None for a log on a disk."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -84,14 +84,13 @@ def replay(
         An MCAP file, a rosbag2 folder of split files, or the URL of an MCAP file; only the parts of
         it that are needed are read.
     config
-        Every option; the defaults of ``roadeval replay`` otherwise. See `roadeval.configure` and
+        Every option; by default those of ``roadeval replay``. See `roadeval.configure` and
         `roadeval.load_config`.
     save, reports, mcap
-        Where the recording, the folder of tables and figures, and the log of masks land; in place
-        of what the configuration says.
+        Paths of the recording, of the folder of tables and figures, and of the log of masks, in
+        place of those in the configuration.
     on_progress
-        Called in the caller's thread after every frame, and where something else begins that takes
-        its time.
+        Called in the caller's thread after every frame, and when another long step begins.
     on_frame
         Called in the caller's thread with every frame in the drive's order: its image, truth, masks
         and counts, without the stages' other layers.
@@ -99,7 +98,7 @@ def replay(
     Raises
     ------
     RoadevalError
-        For any problem that a user can mend: one line with the problem, its place, and what to do.
+        For any problem that a user can solve: one line with the problem, its place, and what to do.
     """
     places = {"save": save, "reports": reports, "mcap": mcap}
     places_given = {name: str(path) for name, path in places.items() if path is not None}
@@ -122,7 +121,7 @@ def replay(
 def _replay_log(
     log: Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
 ) -> Outcome:
-    """Run over the log. All outputs are whole before the first of them takes its name."""
+    """Run over the log. The outputs get their names when all of them are complete."""
     commit, cameras = current_commit(), config.by_camera()
     runs = [
         prepare(log.for_camera(camera_config) if name else log, camera_config, on_progress, name)
@@ -141,7 +140,7 @@ def _replay_log(
         if sidecar:
             sidecar.finish()
         tracebacks = tuple(text for run in runs for text in run.failures.tracebacks())
-        del runs  # figures take the room of its frames and models
+        del runs  # figures need the memory of its frames and models
         trim()
         if config.output.figures:
             from roadeval.report.figures import write_figures
@@ -195,7 +194,7 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
 def recorder_for(
     runs: Sequence[Run], path: Path | None, config: RunConfig
 ) -> AbstractContextManager[Recorder | None]:
-    """Return the recorder of some runs, or None without a path: then Rerun need not be there."""
+    """Return the recorder of some runs; None without a path, so that Rerun is not imported."""
     if path is None:
         return nullcontext()
     from roadeval.recording.recorder import Recorder
@@ -211,7 +210,7 @@ def _finish_recording(
     results: ResultsWriter,
     config: RunConfig,
 ) -> Facts:
-    """Finish the recording; return the facts, for several cameras those of all together."""
+    """Finish the recording, and return the facts of all cameras together."""
     if len(runs) == 1:
         if recorder:
             recorder.finish(ended[0].texts)

@@ -52,7 +52,7 @@ FEW: Final = 12
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 """Signs that a frame has by itself, without the one before."""
 OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "why", "seconds")
-"""Facts that a camera has, but not a whole rig."""
+"""Names of facts that only a single camera has, not a rig."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
@@ -141,7 +141,7 @@ def _why_not_random(run: Run, picks: Picks) -> str:
 
 
 def misfits_of_truth(log: Log) -> Iterator[str]:
-    """Yield how the truth does not fit the images, judged by a few frames and neighbours."""
+    """Yield sentences on truth that does not fit the images, by a few frames and neighbours."""
     selection = log.select()
     numbers = selection.among_truth(log.frames(selection).numbers)
     places = np.linspace(0, len(numbers) - 1, FEW, dtype=int).tolist()
@@ -268,7 +268,7 @@ def versions() -> dict[str, str]:
 
 
 def warnings(run: Run, totals: Totals) -> Iterator[str]:
-    """Yield what a user should know before believing the results."""
+    """Yield warnings that a user should read before using the results."""
     yield from _truth_warnings(run)
     yield from (str(damage) for damage in run.log.damage if not damage.lossy)
     yield from (Sentence("{}: {}", run.selection.image.name, n) for n in run.selection.notes)

@@ -28,12 +28,12 @@ def train(
 ) -> Model:
     """Train every variant on one drive or some, and write the model file.
 
-    ``drives`` are named as for `roadeval.replay_fleet`. From each of them ``training.frames``
-    labelled frames are taken, spread evenly over the selected range. Frames without truth are taken
-    where ``training.source`` is ``patch``, or ``auto`` and no drive has truth. The labels hold for
-    every drive without its own in a manifest. Frames that cannot be decoded are left out, and
-    listed in `Model.losses`. A `RoadevalError` if some drives have truth and others none, or there
-    is nothing to learn.
+    ``drives`` are named as for `roadeval.replay_fleet`. From each drive ``training.frames``
+    labelled frames are used, spread evenly over the selected range. Frames without truth are used
+    if ``training.source`` is ``patch``, or if it is ``auto`` and no drive has truth. The label
+    settings are for every drive without its own in a manifest. Frames that cannot be decoded are
+    left out, and listed in `Model.losses`. A `RoadevalError` if only some drives have truth, or
+    there is nothing to learn.
     """
     config = (config or RunConfig()).resolved()
     settings, entries = config.training, find_drives([str(drive) for drive in list_paths(drives)])
