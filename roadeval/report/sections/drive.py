@@ -91,7 +91,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
 
 
 def _over_time(findings: Findings) -> Iterator[Block]:
-    """Tabulate the flicker of each final mask, beside the truth's, and its error episodes."""
+    """Tabulate the flicker of each final mask and of the truth, and the error episodes."""
     measures = {
         name: measured | measured["episodes"]
         for name, measured in findings.facts.beyond.items()
@@ -129,7 +129,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
 
 
 def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
-    """Yield the errors in each part of the image, of a drive or of many together."""
+    """Yield the errors in each region of the image, for a drive or for many together."""
     if findings.regions.empty:
         return
     yield Heading("Where the errors are")
@@ -162,7 +162,7 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
 
 
 def stages(findings: Findings) -> Iterator[Block]:
-    """Yield the change of the mask by each stage, and each stage's part of the error."""
+    """Yield the rates of each stage's mask, and each stage's part of the error."""
     yield Heading("Which stage broke it")
     yield Figure(charts.stages(findings.facts.totals), caption("stages", baseline=BASELINE))
     columns = merge_names(findings.error_parts.values())
@@ -188,7 +188,7 @@ def stages(findings: Findings) -> Iterator[Block]:
 
 
 def _oracles(findings: Findings) -> Iterator[Block]:
-    """Yield the errors that remain if a stage is replaced by the truth, if the run counted them."""
+    """Yield the errors that remain if the truth replaces a stage; nothing if not counted."""
     rows = [*perfect_stages(findings.table("oracles"), findings.table("frames"))]
     if not rows:
         return
@@ -226,7 +226,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
 
 
 def thresholds(findings: Findings) -> Iterator[Block]:
-    """Yield curves over thresholds and the numbers of them; nothing without a probability."""
+    """Yield curves over thresholds and their numbers; nothing without probabilities."""
     curves, levels = findings.facts.curves, findings.table("probabilities")
     if not curves or not len(levels):
         return
