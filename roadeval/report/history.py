@@ -26,7 +26,7 @@ BARS: Final = "▁▂▃▄▅▆▇█"
 SPARKS: Final = 30
 """Greatest number of bars in the cell that shows a rate over the runs."""
 ROWS: Final = 10
-"""Greatest number of drives of an event, and of charts of regions."""
+"""Greatest number of drives of an event, and of regions, classes and tags with a chart."""
 Rows = list[list[Cell | str]]
 
 
@@ -100,7 +100,7 @@ def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
 
 
 def _figures(history: History) -> Iterator[Block]:
-    """Yield charts of the levels: of all pixels, then of the regions that changed most."""
+    """Yield charts of the levels: of all pixels, then of the parts that changed most."""
     masks = [line for line in history.lines if line.kind == ALL]
     by_rate = {rate: [m for m in masks if m.rate == rate] for rate in (m.rate for m in masks)}
     yield blocks.Figure(
