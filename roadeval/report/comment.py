@@ -30,10 +30,7 @@ _ALIVE: Final = re.compile(
 
 
 def fit(blocks: Iterable[Block], most: int = PART) -> str:
-    """Return the first lines of blocks as Markdown in which no name notifies anybody or is a link.
-
-    They have at most ``most`` bytes in UTF-8.
-    """
+    """Return at most ``most`` bytes of Markdown, in which no name notifies anybody or is a link."""
     lines, shown = blocks_as_markdown(blocks).split("\n"), list[str]()
     for line in lines:
         short = elide(re.sub(r"\S{99,}", lambda word: elide(word[0], 60), line), 1500)
@@ -62,10 +59,7 @@ def levels(pairs: Sequence[tuple[float, float]]) -> str:
 
 
 def changes(rows: Sequence[tuple[str, float]]) -> str:
-    """Return a Mermaid chart of the largest changes, the worst first; empty without changes.
-
-    ``rows`` are names with changes of ERR as fractions.
-    """
+    """Return a Mermaid chart of the largest changes, fractions, the worst first; or nothing."""
     rows = sorted((row for row in rows if row[1] and defined(row[1])), key=lambda row: -abs(row[1]))
     rows = sorted(rows[:BARS], key=lambda row: -row[1])
     most = round(100 * max((abs(y) for _, y in rows), default=0), 3)
@@ -85,10 +79,7 @@ def _mermaid(kind: str, height: int, colours: Sequence[str], *lines: str) -> str
 
 
 def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskChange, str, str]:
-    """Return the mask to name first: one that is surely worse, else the focus.
-
-    With it come a text with its ERR, and a word for its change, such as ``better``.
-    """
+    """Return a surely worse mask, else the focus; its ERR in words; and a word for its change."""
     masks = comparison.finals() or comparison.changes
     focus = focus_of([row.variant for row in masks])
 

@@ -116,10 +116,7 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
 
 
 def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[str, str]) -> bytes:
-    """Encode pictures as ``webm``, ``mp4`` or ``gif``, ``rate`` a second.
-
-    Pictures are ``(H, W, 3)`` uint8 RGB of one size, and H and W are even.
-    """
+    """Return ``(H, W, 3)`` uint8 RGB pictures, H and W even, as ``webm``, ``mp4`` or ``gif``."""
     import av
 
     file = io.BytesIO()
@@ -140,10 +137,7 @@ def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[s
 
 
 def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) -> Rgb:
-    """Return panels below their titles, and a line on colours and, in ``about``, the drive.
-
-    The picture is 960 to 1920 pixels across.
-    """
+    """Return titled panels, 960 to 1920 pixels across, above a line on colours and the drive."""
     import cv2
 
     painted = np.hstack([paint(panel) for panel in panels])

@@ -84,8 +84,7 @@ def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
     """Return the first and the last defined rate, and a bar for each level.
 
     The lowest bar is the least level, the highest bar the greatest one. If several runs share a
-    bar, it shows their mean; a run without a level is a space. ``rates`` and ``levels`` have one
-    fraction a run, NaN where undefined.
+    bar, it shows their mean; a run without a level is a space.
     """
     defined = rates[~np.isnan(rates)]
     if not len(defined):

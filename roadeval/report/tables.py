@@ -78,10 +78,7 @@ def rates_table(facts: Facts | FleetFacts) -> Table:
 def stages_table(
     totals: Totals, changes: Mapping[tuple[str, str], Sequence[float]] | None = None
 ) -> Table:
-    """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled.
-
-    ``changes`` are `Findings.changes`; without them the table has no such shares.
-    """
+    """Tabulate the rates of every stage, and the shares of pixels that it repaired and spoiled."""
     rows: list[list[Cell | str]] = [
         [
             "" if place else variant_cell(variant, [*totals]),

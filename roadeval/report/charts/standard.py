@@ -133,7 +133,7 @@ def over_frames(
 
 
 def ribbons(charts: Sequence[Chart]) -> list[Chart]:
-    """Return a low chart for each series of charts along the drive, all series of one to one scale."""
+    """Return a low chart for each series of charts along the drive; those of one have one scale."""
     return [
         replace(chart, title=series.name, series=[series], y_range=(0.0, max(most, 1.0)), low=True)
         for chart in charts
@@ -200,10 +200,7 @@ def regions(
 
 
 def trimap(counts: Mapping[str, Mapping[str, Sequence[int]]]) -> Chart:
-    """Return a chart of ERR by width around the edge.
-
-    ``counts`` has wrong and labelled pixels, by variant and width.
-    """
+    """Return a chart of ERR by width around the edge, from counts of wrong and labelled pixels."""
     lines = []
     for name, look in looks([*counts]).items():
         shares = [100 * wrong / (labelled or math.nan) for wrong, labelled in counts[name].values()]
@@ -218,10 +215,7 @@ def in_metres(name: str) -> str:
 
 
 def by_distance(errors: Mapping[tuple[str, str], Interval], variants: Sequence[str]) -> Chart:
-    """Return a chart of the error rate by distance ahead, with a row for each band and variant.
-
-    ``errors`` has intervals by band and variant.
-    """
+    """Return a chart of the error rate by distance ahead, with a row for each band and variant."""
     bands = list(dict.fromkeys(band for band, _ in errors))
     by_variant, step = looks(variants), len(variants)
     return Chart(

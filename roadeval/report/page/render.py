@@ -89,7 +89,7 @@ def _hash(code: str) -> str:
 
 
 def variant_of(variants: Sequence[str], text: Cell | str) -> str:
-    """Return the variant of a text such as "a", "a: its mask" or "a − b" (a); empty if none."""
+    """Return the variant that a text begins with, such as "a: its mask"; empty without one."""
     words = text if isinstance(text, str) else text.text
     names = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
     return next(names, "")
