@@ -21,6 +21,7 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from matplotlib.transforms import Bbox, TransformedBbox
 
 from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, Rgb, as_plain
+from roadeval.data.words import counted
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import finals, values_of
 from roadeval.report.chart import FAINT, thin
@@ -182,7 +183,7 @@ def over_drive(name: str, drive: str, windows: pd.DataFrame, width: float = WIDT
     short = short_end(windows, CROWDED)
     size, words = (SMALL, {}) if width < NARROW else (LETTERS, _LABELS)
     names = [words.get(series.name, series.name) for series in charts[0].series]
-    names += [f"mean of {short[0]}"] if short else []
+    names += [f"mean of {counted(short[0], 'frame')}"] if short else []
     labels = [elide(name, _LONGEST) for name in names]
     longest = size * (0.57 * max(map(len, labels)) + HANDLE + 2)
     columns = min(max(int((72 * across + 1.2 * size) // longest), 1), 3)

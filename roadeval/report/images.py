@@ -57,7 +57,7 @@ class ExampleFrame:
     """``(H, W)`` uint8 (0, 1) by variant; a method from outside may lack the frame's mask."""
 
     def small(self) -> ExampleFrame:
-        """Return the example reduced to `EXAMPLE_WIDTH` pixels wide, so that it needs little memory."""
+        """Return the example reduced to `EXAMPLE_WIDTH` pixels across, to save memory."""
         return ExampleFrame(
             self.frame,
             shrink(self.image, EXAMPLE_WIDTH),

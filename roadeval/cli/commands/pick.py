@@ -47,7 +47,7 @@ def pick(
     the rates of the whole drive, with an interval. The others are the most uncertain ones, apart
     from each other, to learn from. FOLDER/images has the images, FOLDER/proposals the present
     masks; put the corrected masks into FOLDER/labels. Picking again into the same folder adds
-    frames. A log is replayed first, by the --config of 'replay'; a result is used as it is.
+    frames. A log is replayed first, with the settings of --config; a result is used as it is.
     """
     arguments.check_one_camera(options)
     config = arguments.configuration(options)

@@ -19,7 +19,7 @@ NS = 1_000_000_000
 
 
 def show(log: LogDescription, out: Console) -> None:
-    """Print what a log holds, and what replay would pick of it."""
+    """Print what a log holds, and what replay would pick from it."""
     size = f"{log.bytes / 1e6:.1f} MB"
     is_partial = not log.verified and not log.by_summary
     unverified = "; not read whole, --verify looks for all damage" if is_partial else ""

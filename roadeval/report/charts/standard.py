@@ -99,9 +99,9 @@ def short_end(windows: pd.DataFrame, most: int = POINTS) -> tuple[int, float, fl
 def describe_points(windows: pd.DataFrame, most: int = POINTS) -> str:
     """Return a clause on how many frames a point of a chart of ``windows`` stands for."""
     size, rows = windows["frames"].max(), -(-windows["window"].nunique() // most)
-    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    point = f"{rows} windows of {size} frames" if rows > 1 else f"{size} frames"
     short = short_end(windows, most)
-    return f"each point is the mean of {point}{f', the last of {short[0]}' if short else ''}"
+    return f"each point is the mean of {point}{f', the last one of {short[0]}' if short else ''}"
 
 
 def over_frames(

@@ -117,7 +117,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     table = Table(
         [
             *("final mask", "flicker, %", "the truth's, %", "beyond it", "pairs"),
-            *("n", "seconds", "longest", "share, %", "recovered", "median recovery"),
+            *("number", "seconds", "longest", "share, %", "recovered", "median recovery"),
         ],
         rows,
         groups=[("", 1), ("from frame to frame", 4), ("error episodes, seconds", 6)],
@@ -194,13 +194,13 @@ def _oracles(findings: Findings) -> Iterator[Block]:
         return
     table = Table(
         [
-            *("variant", "if there were a", "ERR as it is", "ERR then", "change, points"),
+            *("variant", "perfect stage", "ERR as it is", "ERR then", "change, points"),
             *(*(f"{name} then" for name in OTHERS), "frames"),
         ],
         [
             [
                 variant_cell(row["variant"], [*findings.facts.totals]),
-                f"perfect {row['oracle']}",
+                row["oracle"],
                 percent(row["as_is"]),
                 percent(row[TESTED]),
                 points(row[TESTED] - row["as_is"]),

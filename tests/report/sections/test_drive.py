@@ -314,7 +314,7 @@ def test_figures_are_the_paper_s_if_its_pipeline_ran_and_a_short_last_point_is_s
     _, details = over_drive(some_findings(claims=claims, table=tables.get))
     assert details.title.startswith(title)
     first, *others = (block for block in details.blocks if isinstance(block, Figure))
-    assert "each point is the mean of 10 frames, the last of 4." in first.caption
+    assert "each point is the mean of 10 frames, the last one of 4." in first.caption
     assert not any("point" in figure.caption for figure in others)
 
 
