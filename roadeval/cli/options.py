@@ -276,8 +276,7 @@ def with_flags(text: str) -> str:
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     """Return a decorator: the command takes options, and receives their values as ``options``.
 
-    ``settings`` are names of settings in `OPTIONS`, or of whole tables. A ValueError for any other
-    name.
+    ``settings`` are names in `OPTIONS`, or of whole tables. A ValueError for any other name.
     """
     names_of = {option: {option.setting, option.setting.partition(".")[0]} for option in OPTIONS}
     if unknown := {*settings}.difference(*names_of.values()):

@@ -63,9 +63,8 @@ def page_document(
 ) -> Report:
     """Return the report as a page: with a browser of frames, or a table of all drives.
 
-    For many drives, ``worst_frames`` is the greatest number of pictures of worst frames in each of
-    two sections, over all drives and drive by drive, and ``folder`` is the page's folder, to which
-    links to the pages of drives are relative.
+    For many drives ``worst_frames`` limits the pictures of worst frames, over all drives and drive
+    by drive; links to the pages of drives are relative to ``folder``.
     """
     if isinstance(findings, FleetFolder):
         along = partial(drives.along, most=worst_frames, beside=folder)

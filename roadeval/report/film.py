@@ -36,9 +36,8 @@ _WIDTHS: Final = {4: 480, 9: 400, math.inf: 320}
 _KEYFRAMES: Final = 10
 """Frames from one keyframe to the next: the most frames that a seek decodes."""
 _CODECS: Final = {"webm": "libvpx-vp9", "mp4": "libx264", "gif": "gif"}
-"""The codec of each container."""
 _NAMED: Final = {"green": TP, "orange-red": FP, "pink": FN, "grey": GREY}
-"""The colours that captions name."""
+"""The codec of each container, and the colours that captions name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,7 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
 
 
 def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[str, str]) -> bytes:
-    """Return ``(H, W, 3)`` uint8 RGB pictures, H and W even, as ``webm``, ``mp4`` or ``gif``."""
+    """Return ``(H, W, 3)`` uint8 RGB pictures with even sides as a video, ``rate`` a second."""
     import av
 
     file = io.BytesIO()

@@ -81,10 +81,9 @@ def rates_table(lines: Sequence[Line]) -> Table:
 
 
 def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
-    """Return the first and the last defined rate, and a bar for each level.
+    """Return the first and the last defined rate, and bars from the least level to the greatest.
 
-    The lowest bar is the least level, the highest bar the greatest one. If several runs share a
-    bar, it shows their mean; a run without a level is a space.
+    If several runs share a bar, it shows their mean; a run without a level is a space.
     """
     defined = rates[~np.isnan(rates)]
     if not len(defined):

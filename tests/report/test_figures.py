@@ -127,7 +127,7 @@ def test_the_legend_reads_row_by_row_in_the_order_of_the_variants() -> None:
     assert names == ["a", "d", "b", "c"]
 
 
-@pytest.mark.parametrize(("last", "said"), [(10, ""), (4, ", the last of 4")])
+@pytest.mark.parametrize(("last", "said"), [(10, ""), (4, ", the last one of 4")])
 def test_a_short_last_point_is_marked_and_said(last: int, said: str) -> None:
     figure = over_drive(FP_FN_RATE, "drive", a_table(3, last=last))
     assert f"is the mean of 10 frames{said};" in texts(figure)

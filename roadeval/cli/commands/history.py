@@ -17,9 +17,7 @@ def history(
     *,
     by: Annotated[
         str | None,
-        option(
-            "--by", "Name of a --label of replay: results with the same value are one run.", "NAME"
-        ),
+        option("--by", "Name of a --label: results with the same value are one run.", "NAME"),
     ] = None,
     last: Annotated[
         int,

@@ -18,12 +18,7 @@ Listed = Annotated[bool, arguments.option("--list", "List of the worst frames, w
 Frame = Annotated[int | None, arguments.option("--frame", "Frame to open.", "N", min=0)]
 Rank = Annotated[
     int | None,
-    arguments.option(
-        "--worst",
-        "Rank of the frame to open; 1 is the worst. With --list: number of frames.",
-        "K",
-        min=1,
-    ),
+    arguments.option("--worst", "Rank of the frame to open; with --list: how many.", "K", min=1),
 ]
 Focus = Annotated[
     str | None,
@@ -74,9 +69,7 @@ def inspect(
 
     opened = arguments.select_camera(Result(recording, focus=focus), camera)
     if opened.fleet and frame is not None:
-        raise typer.BadParameter(
-            "--frame does not go with a fleet: give the recording of one drive"
-        )
+        raise typer.BadParameter("--frame does not go with a fleet: give one drive's recording")
     if not listed:
         _show(opened, frame, worst, file=screenshot)
     else:
