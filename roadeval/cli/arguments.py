@@ -167,7 +167,7 @@ def _mask_tables(name: str, path: str) -> dict[str, Any]:
 Camera = Annotated[str | None, option("--camera", "Name of one of several cameras.", "NAME")]
 Focus = Annotated[
     str | None,
-    option("--focus", "Variant to speak of. Default: what you brought, else filtered.", "NAME"),
+    option("--focus", "Variant to report on. Default: what you brought, else filtered.", "NAME"),
 ]
 
 

@@ -24,7 +24,7 @@ Focus = Annotated[
     str | None,
     arguments.option(
         "--variant --focus",
-        "Variant whose errors rank the frames. Default: what you brought, else filtered.",
+        "Variant that ranks the frames by its errors. Default: what you brought, else filtered.",
         "NAME",
     ),
 ]

@@ -204,7 +204,8 @@ def test_undefined_rates_are_never_the_best_and_told_and_how_often():
     undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
     totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
     assert list(warnings(some_findings(totals=totals))) == [
-        "filtered: of 1,200 frames, undefined and left out: FNR on 1,200 and FPR on 3."
+        "filtered: means leave out the frames on which a rate is undefined "
+        "(FNR on 1,200 and FPR on 3 of 1,200 frames)."
     ]
 
 
