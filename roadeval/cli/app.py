@@ -144,9 +144,9 @@ def _usage_message(error: typer.TyperException) -> str:
 
     if isinstance(error.__cause__, ValidationError):
         error.message = describe_problem(error.__cause__.errors()[0])
-    # If options do not go together, no parameter is to blame, and no value is invalid.
+    # If options do not go together, no single parameter is wrong.
     is_alone = isinstance(error, typer.BadParameter) and error.param is None
-    # Typer's own guess at an unknown option does not compare beginnings.
+    # For an unknown option Typer guesses none that begins like it, so the guess is made here.
     is_unknown = hasattr(error, "possibilities")
     text = error.message if is_alone or is_unknown else error.format_message()
     sentence = " ".join(text.split()).rstrip(".")

@@ -28,7 +28,7 @@ EXIT_CODES: Final = (
 
 
 class Program(TyperGroup):
-    """The program, whose help begins with commands to copy."""
+    """The program; its help begins with commands to copy."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the whole help."""
@@ -79,7 +79,7 @@ def _write_groups(command: Any, ctx: Any, formatter: Any) -> None:
             group = getattr(param, "rich_help_panel", None) or "Options"
             if param.param_type_name == "argument":
                 group, flags = "Arguments", param.metavar
-            # Names in a meaning, such as those of presets, have a line each.
+            # Each name in a meaning, such as the name of a preset, has a line of its own.
             lines, names = re.subn(r"; (?=\w+: )", "\n", meaning)
             groups.setdefault(group, []).append((flags, f"\b\n{lines}" if names > 1 else meaning))
     if MOST_USED in groups:

@@ -30,7 +30,7 @@ def clip(
         range | None, option("--frames", "One clip, of these frames.", "A:B", parser=_span)
     ] = None,
     focus: arguments.Focus = None,
-    mcap: Annotated[bool, option("--mcap", "Also the log's own messages, as a log.")] = False,
+    mcap: Annotated[bool, option("--mcap", "Log of the messages beside each clip.")] = False,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Film what fails, for people who do not have the data.

@@ -1,4 +1,4 @@
-"""``roadeval history``: which rates have become worse, and since when."""
+"""``roadeval history``: which rates got worse, and since when."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def history(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Show which rates have become worse over many runs, and since when.
+    """Show which rates got worse over many runs, and since when.
 
         roadeval history nightly/
         roadeval history nightly/ --last 10 -o history.html

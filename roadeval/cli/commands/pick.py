@@ -32,7 +32,7 @@ def pick(
     variant: Annotated[
         str | None,
         arguments.option(
-            "--by", "Variant whose masks and uncertainty are used. Default: the first.", "NAME"
+            "--by", "Variant that gives masks and uncertainty. Default: the first.", "NAME"
         ),
     ] = None,
     seed: Annotated[int, arguments.option("--seed", "Random seed.", "N", min=0)] = 0,

@@ -133,7 +133,7 @@ def over_frames(
 
 
 def ribbons(charts: Sequence[Chart]) -> list[Chart]:
-    """Return a low chart for each series of charts along the drive; those of one have one scale."""
+    """Return a low chart for each series of charts along the drive; series of one share a scale."""
     return [
         replace(chart, title=series.name, series=[series], y_range=(0.0, max(most, 1.0)), low=True)
         for chart in charts
@@ -206,7 +206,7 @@ def trimap(counts: Mapping[str, Mapping[str, Sequence[int]]]) -> Chart:
         shares = [100 * wrong / (labelled or math.nan) for wrong, labelled in counts[name].values()]
         lines.append(series(name, look, range(len(shares)), shares))
     names = [*next(iter(counts.values()))]
-    return Chart("ERR within so many pixels of the edge", ChartKind.LINES, lines, names)
+    return Chart("ERR within N pixels of the edge", ChartKind.LINES, lines, names)
 
 
 def in_metres(name: str) -> str:

@@ -73,7 +73,7 @@ def _compile(
     """
     import typst
 
-    # Found without the import, which takes longer than a whole report.
+    # To import Matplotlib takes longer than to make a whole report.
     matplotlib = find_spec("matplotlib")
     assert matplotlib is not None
     assert matplotlib.origin is not None

@@ -1,4 +1,4 @@
-"""The truth's classes that are taken for road, and those beside which road is missed."""
+"""The truth's classes that are taken for road, or beside which road is missed."""
 
 from __future__ import annotations
 

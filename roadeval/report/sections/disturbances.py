@@ -19,7 +19,7 @@ from roadeval.results.why import describe_disturbances
 
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
-    """Yield ERR under each disturbance; nothing if there was none."""
+    """Yield ERR under each disturbance; nothing without disturbances."""
     facts = findings.facts
     if not facts.disturbances:
         return

@@ -130,7 +130,7 @@ LARGE_ON_PAGE: Final = 520
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
-"""Greatest number of frames in the table; the table of a longer drive has those with the highest
+"""Greatest number of frames in the table; of a longer drive it has the frames with the highest
 ERR."""
 
 
@@ -165,7 +165,7 @@ class FrameBrowser(Block):
     rows: Sequence[NotableFrame]
     """The frames of the drive, in order."""
     variants: Sequence[str]
-    """The variants that were scored, or without truth those with signs of doubt."""
+    """The variants with rates, or without truth with signs of doubt."""
     charts: Sequence[Chart]
     """Rates along the drive."""
     command: str = ""
@@ -275,7 +275,7 @@ def strip(
         pictures, variant = [], images[0].title.partition(":")[0] if images else ""
         for place, image in enumerate(images):
             name = f"{variant}: {image.title}" if place else image.title
-            # Without truth people look at the last mask.
+            # Without truth the last mask is the picture to look at.
             is_large = not frame.rates and image is images[-1]
             pictures.append(_picture(image, name, LARGE_ON_PAGE if is_large else layers))
         rows.append(pictures)

@@ -81,7 +81,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
 def why(facts: Facts | FleetFacts, variant: str | None = None) -> Iterator[BulletList]:
     """Yield the reasons for the errors of a variant, by default the focus, if there are any.
 
-    Paper shows the reasons of the focus only; a page shows those of the chosen focus.
+    Paper shows only the reasons of the focus; a page shows the reasons of the chosen focus.
     """
     name = variant or facts.focus or ""
     if reasons := facts.why.get(name):

@@ -45,7 +45,7 @@ from roadeval.report.sections.slices import when_it_fails
 from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import differences_table, rates_table, stages_table
 from roadeval.results.facts import Facts, FrameAccount, TrainingFacts
-from roadeval.results.fleet import FleetFolder
+from roadeval.results.fleet import APART_NS, OF_A_DRIVE, FleetFolder
 from roadeval.results.schema import FAILED, SCORED
 from roadeval.results.tables import read_table
 from tests.evaluation.making import a_table
@@ -362,7 +362,7 @@ def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
 
 @pytest.mark.parametrize(
     ("frames", "slices", "begin"),
-    [(90, {"filtered": []}, "Nothing is confirmed."), (39, {}, "Too little")],
+    [(90, {"filtered": []}, "No condition is confirmed."), (39, {}, "Too little")],
 )
 def test_where_no_slice_holds_a_sentence_says_so(frames, slices, begin):
     heading, sentence = blocks(frames, **slices)
@@ -452,6 +452,8 @@ def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, fleet
     told = opened_blocks(drives.worst, (FleetFolder(copy)))
     assert len(told[1].pictures) == 11
     assert "Not in the folder: 1 picture." in told[2].text
+    limits = f"at most {OF_A_DRIVE} frames of a drive, at least {APART_NS // 10**9} seconds apart"
+    assert limits in told[2].text
 
 
 def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):
