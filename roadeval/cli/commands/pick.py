@@ -72,13 +72,11 @@ def pick(
         console.say(f"{drive.folder}: {added} to label: {drawn}{uncertain}")
     if drives and not quiet:
         out = console.results()
-        folder = drives[0].folder
+        folder = drives[0].folder if len(drives) == 1 else output / "{drive}"
         out.print(f"Correct {folder}/proposals, and put the results into {folder}/labels.")
         logs, run_toml = join(drive.log for drive in drives), quote(str(drives[0].config))
-        command = f"replay {logs} --config {run_toml} --truth {quote(str(folder))}"
-        if len(drives) > 1:
-            truth = quote(f"{output}/{{drive}}")
-            command = f"fleet {logs} --config {run_toml} --truth {truth} -o labelled"
-        console.show_next(out, f"roadeval {command}")
+        name, more = ("replay", "") if len(drives) == 1 else ("fleet", " -o labelled")
+        truth = quote(str(folder))
+        console.show_next(out, f"roadeval {name} {logs} --config {run_toml} --truth {truth}{more}")
     messages.warn_of_missing_loops()
     return ExitCode.DONE
