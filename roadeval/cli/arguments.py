@@ -183,8 +183,8 @@ def select_camera(result: Result_, name: str | None) -> Result_:
     by_short_name = {short: camera for camera, short in short_names([*result.cameras]).items()}
     camera = by_short_name.get(name, name)
     if camera not in result.cameras:
-        known = f"the result has {', '.join(by_short_name)}" if by_short_name else "leave it out"
-        raise typer.BadParameter(f"--camera {name}: there is no such camera; {known}")
+        choice = f"the result has {', '.join(by_short_name)}" if by_short_name else "leave it out"
+        raise typer.BadParameter(f"--camera {name}: there is no such camera; {choice}")
     return result.cameras[camera]
 
 

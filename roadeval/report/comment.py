@@ -22,7 +22,7 @@ from roadeval.runtime.text import elide
 
 MOST, PART, POINTS, BARS = 60_000, 9_000, 60, 12
 """Greatest numbers: bytes of a comment and of a part of it, points and bars of a chart."""
-_ALIVE: Final = re.compile(
+_LINKABLE: Final = re.compile(
     r"\S*(?:\\(?:[^_*\[\]<>]|<[a-z!/?])|[…!]|%\w|:(?!\d\d\b)\S|//|www\.|[a-z]-\d|\b[\da-f]{7})\S*",
     re.IGNORECASE,
 )
@@ -34,12 +34,12 @@ def fit(blocks: Iterable[Block], most: int = PART) -> str:
     lines, shown = blocks_as_markdown(blocks).split("\n"), list[str]()
     for line in lines:
         short = elide(re.sub(r"\S{99,}", lambda word: elide(word[0], 60), line), 1500)
-        inert = _ALIVE.sub(lambda word: in_code(re.sub(r"\\(.)", r"\1", word[0])), short)
-        most -= len(inert.encode()) + 1
+        safe_line = _LINKABLE.sub(lambda word: in_code(re.sub(r"\\(.)", r"\1", word[0])), short)
+        most -= len(safe_line.encode()) + 1
         if most < 0:
             shown.append(f"\n*Left out here: {len(lines) - len(shown)} lines.*")
             break
-        shown.append(re.sub(r"(?<=\w) \\> ", " > ", inert))
+        shown.append(re.sub(r"(?<=\w) \\> ", " > ", safe_line))
     return "\n".join(shown).strip() + "\n"
 
 

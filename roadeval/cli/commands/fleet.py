@@ -63,8 +63,8 @@ def fleet(
         messages.warning(sentence)
     if lines := [*screen.manifest(outcome.facts)]:
         messages.note(
-            "labels differ from drive to drive: state `labels` in a manifest, as drives.toml, and "
-            "give that in place of the drives"
+            "labels differ from drive to drive: state `labels` in a manifest, such as drives.toml, "
+            "and give the manifest in place of the drives"
         )
         for line in lines:
             console.diagnostics().print(line, soft_wrap=True)

@@ -89,17 +89,17 @@ def short_end(windows: pd.DataFrame, most: int = POINTS) -> tuple[int, float, fl
     spans = windows.groupby("window")[["first_frame", "last_frame", "frames"]].agg(
         {"first_frame": "min", "last_frame": "max", "frames": "max"}
     )
-    rows = -(-len(spans) // most)
-    last = spans.iloc[(len(spans) - 1) // rows * rows :]
-    if (frames := int(last["frames"].sum())) >= rows * spans["frames"].max():
+    per_point = -(-len(spans) // most)
+    last = spans.iloc[(len(spans) - 1) // per_point * per_point :]
+    if (frames := int(last["frames"].sum())) >= per_point * spans["frames"].max():
         return None
     return frames, last["first_frame"].min() - 0.5, last["last_frame"].max() + 0.5
 
 
 def describe_points(windows: pd.DataFrame, most: int = POINTS) -> str:
     """Return a clause on how many frames a point of a chart of ``windows`` stands for."""
-    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // most)
-    point = f"{rows} windows of {size} frames" if rows > 1 else f"{size} frames"
+    size, per_point = windows["frames"].max(), -(-windows["window"].nunique() // most)
+    point = f"{per_point} windows of {size} frames" if per_point > 1 else f"{size} frames"
     short = short_end(windows, most)
     return f"each point is the mean of {point}{f', the last one of {short[0]}' if short else ''}"
 

@@ -43,8 +43,8 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     yield from edges_tables(rows, names)
     (source,) = (topic for topic in findings.facts.drive.topics if topic.startswith(METRES))
     flat = caption("camera", camera=source.removeprefix(METRES))
-    sway = caption("posed camera" if _is_posed(rows) else "homography", unfiltered=UNFILTERED)
-    yield Text(f"{flat} {sway}", "note")
+    effect = caption("posed camera" if _is_posed(rows) else "homography", unfiltered=UNFILTERED)
+    yield Text(f"{flat} {effect}", "note")
 
 
 def kitti_table(facts: Facts) -> Table:
@@ -82,7 +82,7 @@ def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool
         bases = [measures[first, TESTED, place] for place in places]
         marks = [
             UNSURE
-            if variant != first and posed and _sway(row) > abs(row["value"] - base["value"])
+            if variant != first and posed and _pose_effect(row) > abs(row["value"] - base["value"])
             else ""
             for row, base in zip(errors, bases, strict=True)
         ]
@@ -116,7 +116,7 @@ def _is_posed(rows: Sequence[Measure]) -> bool:
     return any(defined(row["low"]) for row in rows)
 
 
-def _sway(row: Measure) -> float:
+def _pose_effect(row: Measure) -> float:
     """Return how much a wrong pose can change a number; infinite if there may be no number."""
     if not defined(row["low"]):
         return math.inf
@@ -162,7 +162,7 @@ def _end(row: Measure, *, posed: bool) -> tuple[str, str, str, str]:
     """Return the cells of an edge or end: median, range, 95th percentile, missing frames."""
     if not row["frames"]:
         return (DASH,) * 4
-    unsure = posed and defined(row["value"]) and _sway(row) > abs(row["value"])
+    unsure = posed and defined(row["value"]) and _pose_effect(row) > abs(row["value"])
     ends = (_metres(row[end]) for end in ("low", "high"))
     span = " to ".join(ends) if defined(row["low"]) else DASH
     median, size = f"{UNSURE * unsure}{_metres(row['value'])}", _metres(row["p95"]).lstrip("+")
