@@ -89,7 +89,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def explain(error: BaseException) -> int:
-    """Write in one line why the command ended, and a draft of a file that helps; return exit code.
+    """Write in one line why the command ended, and a draft that helps; return the exit code.
 
     With ``ROADEVAL_DEBUG=1`` in the environment, the traceback comes first.
     """

@@ -19,7 +19,7 @@ PROGRAM: Final = "roadeval"
 
 
 def error(sentence: str, draft: str = "") -> None:
-    """Write an error, ``roadeval: error: ...``, and below it a draft of a file that helps."""
+    """Write an error, ``roadeval: error: ...``, and below it a draft of a file that solves it."""
     _write("error", "bold red", sentence)
     if draft:
         sys.stderr.write(f"\n{visible_lines(draft)}\n")
