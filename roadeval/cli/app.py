@@ -1,4 +1,4 @@
-"""The command line: its commands, and the messages of errors."""
+"""The command line: its commands, and messages about errors."""
 
 from __future__ import annotations
 
@@ -89,9 +89,9 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def explain(error: BaseException) -> int:
-    """Write why the command ended, in one line and a draft that mends it; return its exit code.
+    """Write in one line why the command ended, and a draft that helps; return the exit code.
 
-    If ``ROADEVAL_DEBUG=1`` is in the environment, the traceback comes first.
+    With ``ROADEVAL_DEBUG=1`` in the environment, the traceback comes first.
     """
     messages.traceback("".join(traceback.format_exception(error)))
     sentence: str
@@ -125,7 +125,7 @@ def explain(error: BaseException) -> int:
 
 
 def _fault_of_a_package(error: BaseException) -> str:
-    """Return the sentence on an error of a package from outside, or one that is missing."""
+    """Return a sentence if a package from outside fails or is missing; else an empty text."""
     if isinstance(error, ModuleNotFoundError) and not f"{error.name}".startswith("roadeval"):
         return f"{error.name} is not installed: install roadeval with all that it depends on"
     package = discovery.failed_package(error)
@@ -133,7 +133,7 @@ def _fault_of_a_package(error: BaseException) -> str:
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:
-    """Append the notes of an error, as the path of a partial output."""
+    """Return a sentence with the notes of an error, such as the path of a partial output."""
     return Sentence("; ").join([sentence, *getattr(error, "__notes__", ())])
 
 
@@ -144,9 +144,9 @@ def _usage_message(error: typer.TyperException) -> str:
 
     if isinstance(error.__cause__, ValidationError):
         error.message = describe_problem(error.__cause__.errors()[0])
-    # If options do not go together, no parameter is to blame, and no value is invalid.
+    # If options do not go together, no single parameter is wrong.
     is_alone = isinstance(error, typer.BadParameter) and error.param is None
-    # Typer's own guess at an unknown option does not see that it begins like another one.
+    # For an unknown option Typer guesses none that begins like it, so the guess is made here.
     is_unknown = hasattr(error, "possibilities")
     text = error.message if is_alone or is_unknown else error.format_message()
     sentence = " ".join(text.split()).rstrip(".")

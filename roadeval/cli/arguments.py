@@ -1,4 +1,4 @@
-"""The arguments that several commands share, and the configuration that options make."""
+"""Arguments that several commands share, and the configuration that options describe."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ Quiet = Annotated[bool, option("-q --quiet", "No progress and no tables; warning
 
 
 def ending_in(*endings: str, unnamed: tuple[str, ...] = ()) -> Callable[[Any], Any]:
-    """Return the callback of an option whose paths must have one of these endings.
+    """Return an option's callback that refuses paths with other endings.
 
-    Those that are ``unnamed`` are allowed, too, but the message does not propose them.
+    The ``unnamed`` endings are allowed, too, but the message does not propose them.
     """
 
     def check(paths: Any) -> Any:
         for path in paths if isinstance(paths, list) else filter(None, [paths]):
             if path.suffix.lower() not in (*endings, *unnamed):
                 choice = f"{', '.join(endings[:-1])} or {endings[-1]}"
-                raise typer.BadParameter(f"{path}: end it in {choice}")
+                raise typer.BadParameter(f"{path}: the name must end in {choice}")
         return paths
 
     return check
@@ -84,7 +84,7 @@ Conditions = Annotated[
 
 
 def configuration(options: OptionValues) -> RunConfig:
-    """Return the configuration that a preset, a file, and options on top of both make.
+    """Return the configuration of a preset, a file on top of it, and options on top of both.
 
     A `typer.BadParameter` if a value is wrong whatever the files hold, or options do not go
     together; a `RoadevalError` if a file cannot be used.
@@ -140,7 +140,7 @@ def _first_brought(config: RunConfig, options: OptionValues) -> RunConfig:
 
 
 def _variant(name: str, path: str | None) -> Variant:
-    """Return the variant that a file or a preset defines; by default the preset of its name."""
+    """Return a variant by a file or preset; without ``path`` the preset ``name`` defines it."""
     from roadeval.config.tables import read_tables
     from roadeval.config.variants import PRESETS, Variant
 
@@ -152,7 +152,7 @@ def _variant(name: str, path: str | None) -> Variant:
 
 
 def _mask_tables(name: str, path: str) -> dict[str, Any]:
-    """Return the settings of masks that lie in a folder or log, or that a TOML file describes."""
+    """Return the settings of masks in a folder or a log, or the settings in a TOML file."""
     from roadeval.config.tables import in_file, read_tables
     from roadeval.config.variants import with_masks
 
@@ -164,17 +164,17 @@ def _mask_tables(name: str, path: str) -> dict[str, Any]:
     return tables
 
 
-Camera = Annotated[str | None, option("--camera", "One of several cameras.", "NAME")]
+Camera = Annotated[str | None, option("--camera", "Name of one of several cameras.", "NAME")]
 Focus = Annotated[
     str | None,
-    option("--focus", "Variant to speak of. Default: what you brought, else filtered.", "NAME"),
+    option("--focus", "Variant to report on. Default: what you brought, else filtered.", "NAME"),
 ]
 
 
 def select_camera(result: Result_, name: str | None) -> Result_:
     """Return the result of a rig's camera, by its name or the part by which the names differ.
 
-    Return the result itself if no camera is named. A `typer.BadParameter` if there is no such one.
+    Return the result itself if ``name`` is None. A `typer.BadParameter` if it has no such camera.
     """
     if name is None:
         return result
@@ -183,8 +183,8 @@ def select_camera(result: Result_, name: str | None) -> Result_:
     by_short_name = {short: camera for camera, short in short_names([*result.cameras]).items()}
     camera = by_short_name.get(name, name)
     if camera not in result.cameras:
-        names = ", ".join(by_short_name) or "only one"
-        raise typer.BadParameter(f"--camera {name}: the result has {names}")
+        choice = f"the result has {', '.join(by_short_name)}" if by_short_name else "leave it out"
+        raise typer.BadParameter(f"--camera {name}: there is no such camera; {choice}")
     return result.cameras[camera]
 
 
@@ -206,7 +206,7 @@ def _check_names(options: OptionValues) -> None:
             taken.append(name)
     labels = [name for name, _ in options.get("output.labels", ())]
     if len({*labels}) < len(labels):
-        raise RoadevalError("two have one name", setting="output.labels")
+        raise RoadevalError("two labels have the same name", setting="output.labels")
 
 
 def _tables(options: OptionValues) -> dict[str, Any]:

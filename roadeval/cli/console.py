@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 NARROWEST: Final = 20
 STANDARD: Final = 80
-"""Columns of a terminal. One that claims to be narrower than the first, for example because of
-``COLUMNS``, is taken to have the second number."""
+"""Columns. A terminal that claims fewer than `NARROWEST`, for example because of ``COLUMNS``, is
+taken to have `STANDARD` columns."""
 _PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
@@ -59,7 +59,7 @@ def show_next(out: Console, *commands: str) -> None:
 def _terminal(file: IO[str] | None = None) -> Console:
     """Return Rich's console on a stream, by default stderr; it escapes every string.
 
-    It does not escape a `Text`, as only the program itself makes one.
+    A `Text` is not escaped, because only the program itself makes one.
     """
     from rich.console import Console
 
@@ -74,7 +74,7 @@ def _terminal(file: IO[str] | None = None) -> Console:
 
 
 class _TrimmedStream:
-    """A stream that drops the spaces at the ends of lines, as tables have them."""
+    """A stream that drops spaces at the ends of lines, such as the padding of tables."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -134,7 +134,7 @@ def break_lines(sentence: str, out: Console) -> Text:
 
 
 def say(sentence: str, out: Console | None = None) -> None:
-    """Print a sentence, by default on stdout, which breaks between words at a terminal."""
+    """Print a sentence, by default on stdout; at a terminal it breaks between words."""
     out = out or results()
     out.print(break_lines(sentence, out), soft_wrap=True)
 

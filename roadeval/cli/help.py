@@ -11,8 +11,7 @@ from typer.core import TyperCommand, TyperGroup
 from roadeval.cli.options import MOST_USED
 
 WIDEST: Final = 160
-"""Greatest number of columns of a help text; a terminal that is wider has longer lines than one can
-read."""
+"""Greatest number of columns of a help text, because longer lines are hard to read."""
 FLAGS_WIDTH: Final = 27
 """Columns for flags; the meaning of a longer one begins on the next line."""
 START: Final = (
@@ -20,7 +19,7 @@ START: Final = (
     ("roadeval replay demo.mcap --save demo.rrd", "verdict, tables, figures"),
     ("roadeval report demo.rrd -o demo.html", "a page to browse"),
 )
-"""The first commands of a new user, with what they give."""
+"""The first commands of a new user, and what they produce."""
 READ_ON: Final = "Read on: 'roadeval COMMAND --help', README.md, and docs/tutorial.md."
 EXIT_CODES: Final = (
     "Exit codes: 0 done; 1 a file cannot be used; 2 wrong usage; 3 done, but part of a log is "
@@ -29,7 +28,7 @@ EXIT_CODES: Final = (
 
 
 class Program(TyperGroup):
-    """The program, whose help begins with commands to copy."""
+    """The program; its help begins with commands to copy."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the whole help."""
@@ -51,7 +50,7 @@ class Program(TyperGroup):
 
 
 class GroupedCommand(TyperCommand):
-    """A command, whose docstring has a line, indented examples, and explanations."""
+    """A command; its docstring has a line, indented examples, and explanations."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the placeholders of the options and of each argument."""
@@ -80,7 +79,7 @@ def _write_groups(command: Any, ctx: Any, formatter: Any) -> None:
             group = getattr(param, "rich_help_panel", None) or "Options"
             if param.param_type_name == "argument":
                 group, flags = "Arguments", param.metavar
-            # Names in a meaning, such as those of presets, have a line each.
+            # Each name in a meaning, such as the name of a preset, has a line of its own.
             lines, names = re.subn(r"; (?=\w+: )", "\n", meaning)
             groups.setdefault(group, []).append((flags, f"\b\n{lines}" if names > 1 else meaning))
     if MOST_USED in groups:

@@ -1,4 +1,4 @@
-"""Sentences for the person at the terminal: one line each, on stderr."""
+"""Messages to the person at the terminal: one line each, on stderr."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PROGRAM: Final = "roadeval"
 
 
 def error(sentence: str, draft: str = "") -> None:
-    """Write an error, ``roadeval: error: ...``, and below it the draft of a file that mends it."""
+    """Write an error, ``roadeval: error: ...``, and below it a draft of a file that solves it."""
     _write("error", "bold red", sentence)
     if draft:
         sys.stderr.write(f"\n{visible_lines(draft)}\n")
@@ -32,7 +32,7 @@ def warning(*sentences: str) -> None:
 
 
 def note(sentence: str) -> None:
-    """Write what happens now, if that takes long: ``roadeval: note: ...``."""
+    """Write a note, such as on work that takes long: ``roadeval: note: ...``."""
     _write("note", "bold", sentence)
 
 
@@ -77,7 +77,7 @@ def interruption(sentence: str) -> None:
 
 
 def _write(kind: str, style: str, sentence: str) -> None:
-    """Write a line that names settings by their flags."""
+    """Write a line on stderr, with settings named by their flags."""
     text = visible(without_secrets(with_flags(sentence)))
     try:
         stderr = console.diagnostics()
@@ -86,5 +86,5 @@ def _write(kind: str, style: str, sentence: str) -> None:
         shown.stylize(style, begin, begin + len(kind) + 1)
         stderr.print(shown, soft_wrap=True)
     except (ImportError, MemoryError):
-        # If memory is short, the library does not load.
+        # Rich cannot be loaded, for example because memory is short.
         sys.stderr.write(f"{PROGRAM}: {kind}: {text}\n")

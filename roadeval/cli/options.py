@@ -42,13 +42,13 @@ class MethodSettings:
     variants: Further variant: a preset, as robust, or a file of settings.
     nets: Network as a further variant: an ONNX file, a Hugging Face folder, or a TOML file.
     masks: Masks as a further variant: a folder, LOG.mcap:/topic, or a TOML file.
-    tunes: Method, as a network, that is corrected in a further variant NAME_tuned, which learns
-        from this drive's first labelled frames. Its trees use the method's output and all features
-        of the preset robust, and learn where the method errs.
+    tunes: Method, such as a network, that a further variant NAME_tuned corrects: it learns from
+        this drive's first labelled frames where the method errs. Its trees use the method's output
+        and all features of the preset robust.
     only: Variant to run, masks included; the others are left out. If none of them learns anything,
         no frame is used for training.
-    cameras: Topic of the camera, if the log has several. If it is given again, each camera is
-        replayed, scored by itself, and recorded beside the others.
+    cameras: Topic of the camera, if the log has several. If several topics are given, each camera
+        is replayed and scored by itself, and recorded beside the others.
     ground: File of the camera's height, angles and lens, if the log lacks them: with these, errors
         are counted in metres, too. A TOML file, or the YAML of ROS's camera_calibration or of
         Kalibr.
@@ -75,7 +75,7 @@ class MethodSettings:
 
 MOST_USED: Final = "Most used"
 FIRST: Final = ("truth.path", "labels.road", "nets", "masks", "variants", "output.reports")
-"""Settings whose flags most people need, in the order of that group."""
+"""Settings with the flags that most people need, in their order in the help."""
 GROUPS: Final = (
     *(MOST_USED, "Output", "Methods", "Training", "Truth", "Range"),
     *("Input", "Execution", "Fleet"),
@@ -109,9 +109,9 @@ class Option:
     kind: Any
     """The type of what is typed; a list for an option that can be repeated."""
     read: Callable[[str], Any] | None
-    """The function that turns a word of such a list into a value."""
+    """The function that turns an item of a list into a value; None for other types."""
     group: str
-    """Its group of the help."""
+    """The group in the help."""
 
     @property
     def argument(self) -> str:
@@ -178,7 +178,7 @@ def _help(meaning: str, kind: Any, default: Any) -> str:
 
 
 def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:
-    """Return the type of what is typed for a value of a type, and the function that reads it.
+    """Return the type that Typer reads for a setting's type, and the function that reads an item.
 
     ``names`` is the flag and the placeholder of the name in its value, such as ``--net NAME``.
     """
@@ -228,7 +228,7 @@ def read_named(names: str, text: str, *, alone: bool = False) -> tuple[str, str 
         return text, None
     *name, value = text.split("=", 1)
     if not value:
-        raise typer.BadParameter(f"{text!r} has nothing after '='")
+        raise typer.BadParameter(f"{text!r} has nothing after '='; write {names}=VALUE")
     if not any(name):
         flag = names.partition(" ")[0]
         raise typer.BadParameter(f"{text!r}: write {names}={value}, as {flag} mine={value}")
@@ -244,7 +244,7 @@ OPTIONS: Final = tuple(
         ),
     )
 )
-"""In the order of the help."""
+"""All options, in the order of the help."""
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "topics.image": "--image-topic"
 }
@@ -274,9 +274,9 @@ def with_flags(text: str) -> str:
 
 
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """Let a command take the options of some settings, and receive their values as ``options``.
+    """Return a decorator: the command takes options, and receives their values as ``options``.
 
-    The settings are those of `OPTIONS`, or whole tables. A ValueError for any other name.
+    ``settings`` are names in `OPTIONS`, or of whole tables. A ValueError for any other name.
     """
     names_of = {option: {option.setting, option.setting.partition(".")[0]} for option in OPTIONS}
     if unknown := {*settings}.difference(*names_of.values()):

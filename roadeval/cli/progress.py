@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar at a terminal, a plain line now and then elsewhere."""
+"""Progress on stderr: a bar at a terminal, elsewhere a plain line from time to time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def show(quiet: bool = False) -> Iterator[Callable[[Progress], None]]:
 class Watch:
     """Progress on a display of Rich, which also measures the pace.
 
-    With ``lines`` it is written as plain lines: when a stage begins or ends, and in between every
+    With ``lines``, plain lines are written instead of a bar: when a stage begins or ends, and every
     `LINE_PERIOD_S` seconds.
     """
 

@@ -19,11 +19,11 @@ MISLEADING: Final = ("MPLBACKEND", "RERUN")
 def take_over(*, debug: bool) -> None:
     """Prepare the streams, and drop the messages that libraries write to them.
 
-    The program itself reports all that concerns the user. Only the reason of a crash is written;
-    with ``debug`` everything is.
+    The program itself reports all that concerns the user. Libraries may write only the reason of a
+    crash; with ``debug`` they may write everything.
     """
-    # Missing streams are opened, so that no other file gets their numbers. Writing to stdout then
-    # still fails, as it should.
+    # Closed streams are opened, so that no other file gets their numbers. Stdout is opened for
+    # reading, so that writing to it still fails.
     for number, flags in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
             os.fstat(number)
@@ -52,7 +52,7 @@ def take_over(*, debug: bool) -> None:
 
 
 class _LossyFile(FileIO):
-    """A file that ignores errors of writing, as a closed stderr must not stop the work."""
+    """A file that ignores errors of writing, because a closed stderr must not stop the work."""
 
     def write(self, content: Any) -> int:
         """Write as much as possible, and report everything as written."""

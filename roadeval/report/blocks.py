@@ -1,4 +1,4 @@
-"""Blocks that a document is made of.
+"""The blocks of a document.
 
 `roadeval.report.pdf` sets them on paper, `roadeval.report.page` on a page for a browser. Text is
 text, never markup: the name of a log, a topic or a path is printed as it is.
@@ -123,7 +123,7 @@ class BulletList(Block):
     tone: str = "plain"
     """``plain`` or ``warning``."""
     focus: str = ""
-    """The variant that it is about; a page shows it while this is the focus. Empty: always."""
+    """The variant in question: a page shows the list while it is the focus. Empty: always."""
     on_paper: bool = True
 
 
@@ -137,7 +137,7 @@ class Cell(Block):
     look: Look | None = None
     """The look of its variant in charts; the mark stands before the text."""
     frames: Sequence[int] = ()
-    """The frames, if the text is a list of their numbers; on a page these are links."""
+    """Numbers of the frames that the text lists; on a page they are links."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class Table(Block):
     breaks: Sequence[int] = ()
     """Rows with a thin rule above them."""
     groups: Sequence[tuple[str, int]] = ()
-    """Titles above several columns, with their numbers of columns; together all columns."""
+    """Titles above groups of columns, each with its number of columns; no column is left out."""
     caption: str = ""
     """The text above the table."""
     small: bool = False
@@ -167,7 +167,7 @@ class Table(Block):
 def blocks_as_markdown(blocks: Iterable[Block]) -> str:
     """Return headings, texts, lists and tables as Markdown, without other blocks.
 
-    A heading below which nothing is left stays away, too.
+    A heading with nothing left below it is omitted, too.
     """
     from_last: list[Block] = []
     for block in reversed([*blocks]):
@@ -198,7 +198,7 @@ def blocks_as_markdown(blocks: Iterable[Block]) -> str:
 
 
 def plain(item: Cell | Reason | str) -> str:
-    """Return the text of a table's cell, or of an item of a list."""
+    """Return the text of a cell of a table or of an item of a list."""
     return item if isinstance(item, str) else item.text
 
 
@@ -230,7 +230,7 @@ class ImageGrid(Block):
     pictures: Sequence[tuple[str, ImageFile]]
     columns: int
     skip: int = 0
-    """Places of the first row that stay free on paper."""
+    """Number of places at the start of the first row that stay empty on paper."""
     caption: str = ""
     """The text below all pictures."""
 
@@ -254,7 +254,7 @@ class Details(Block):
 
 @dataclass(frozen=True)
 class TwoColumns(Block):
-    """Two stacks of blocks side by side; the left stack takes ``share`` of the width."""
+    """Two stacks of blocks side by side; ``share`` is the left stack's part of the width."""
 
     left: Sequence[Block]
     right: Sequence[Block]
@@ -283,11 +283,11 @@ class Report(Block):
 
 @dataclass(frozen=True)
 class Picture(Block):
-    """A picture of a strip."""
+    """A picture of a frame."""
 
     name: str
-    """The same name in every frame, such as ``filtered: errors``: another frame shows its
-    picture."""
+    """A name such as ``filtered: errors``, the same in every frame, so that a page keeps showing
+    this picture from frame to frame."""
     title: str
     """A few words on its content."""
     image: ImageFile
@@ -302,14 +302,14 @@ class Strip(Block):
     rates: Table | None
     """Rates of each variant's final mask; None without truth."""
     rows: Sequence[Sequence[Picture]]
-    """Pictures of the outcomes, then of the layers of each variant."""
+    """A row of pictures of the outcomes, then a row for each variant with its layers."""
     command: str = ""
     """The command that opens the frame in the viewer; empty without a recording."""
 
 
 @dataclass(frozen=True)
 class DriveRow(Block):
-    """A drive of many on a page: an error rate along the drive, and its worst frames."""
+    """One of many drives on a page: its error rate along the drive, and its worst frames."""
 
     name: str
     note: str

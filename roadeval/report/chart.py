@@ -1,7 +1,7 @@
 """Charts as data: their values and looks, for paper and for a page.
 
-`roadeval.report.charts` makes them of a result's rows, `roadeval.report.drawing` places their
-parts, and the templates of `roadeval.report.pdf` and `roadeval.report.page` draw these.
+`roadeval.report.charts` makes charts from a result's rows, `roadeval.report.drawing` places their
+parts, and the templates of `roadeval.report.pdf` and `roadeval.report.page` draw the parts.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _DASHES: Final = ("solid", "dashed", "dotted", "dash-dotted")
 
 
 def looks(variants: Sequence[str]) -> dict[str, Look]:
-    """Return each variant's look; variants that the user added take turns at further looks."""
+    """Return each variant's look; the variants that a user added take further looks in turn."""
     further = cycle(
         replace(look, colour=colours.hex_of(colours.on_paper(colour)))
         for look, colour in zip(_FURTHER, colours.EXTRA, strict=True)
@@ -62,7 +62,7 @@ def looks(variants: Sequence[str]) -> dict[str, Look]:
 
 
 def looks_of_results(masks: Mapping[str, tuple[str, str]]) -> dict[str, Look]:
-    """Return the looks of masks of several results; ``masks`` are pairs of result and variant.
+    """Return the looks of masks of several results; ``masks`` has the result and variant of each.
 
     A variant keeps its colour; the dash and the filling of the marks distinguish results. If
     variants of one result are compared, each variant has a look of its own.
@@ -110,7 +110,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Level:
-    """A line across a chart, as a mean, with the ends of its interval; NaN without an interval."""
+    """A line across a chart, such as a mean, with the ends of its interval; NaN without one."""
 
     name: str
     value: float
@@ -144,18 +144,18 @@ class Chart:
     from_zero: bool = True
     """Whether the axis of values begins at zero."""
     share: Sequence[float] = ()
-    """Shares of the pixels at each name, as pale bars behind the marks; or none."""
+    """The share of the pixels at each name, drawn as a pale bar behind the marks; or empty."""
     level: Level | None = None
-    """A value that lies across the chart."""
+    """A line across the chart; or None."""
     across: str = ""
-    """Quantity of positions that are neither frames nor names, such as ``recall``; in `unit`."""
+    """The quantity, in `unit`, of positions that are neither frames nor names: ``recall``."""
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     """Ends of the axes; by default the ends of the numbers."""
     sums: int = 0
-    """Number of the last names that sum up the others; a rule separates them."""
+    """How many names at the end sum up the others; a rule separates them."""
     low: bool = False
-    """Whether it is a ribbon on a page, a few millimetres high."""
+    """Whether the chart is a ribbon on a page, a few millimetres high."""
 
     @property
     def of_frames(self) -> bool:
@@ -163,7 +163,7 @@ class Chart:
         return not self.names and not self.across
 
     def legend(self) -> Iterator[LegendEntry]:
-        """Yield the entries of its legend."""
+        """Yield the entries of the chart's legend."""
         for series in self.series:
             if series.x:
                 line = "line" if self.across else "both"

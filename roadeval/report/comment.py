@@ -1,6 +1,6 @@
 """Text and charts of a comment on a pull request, and a badge.
 
-Sites seek mentions, issues and addresses in what Markdown became: no backslash helps, code does.
+Sites make links of mentions, issues and addresses, even behind a backslash, but not inside code.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from roadeval.results.sentences import is_sure
 from roadeval.runtime.text import elide
 
 MOST, PART, POINTS, BARS = 60_000, 9_000, 60, 12
-"""Bytes of a comment and of a part; points and bars of a chart."""
-_ALIVE: Final = re.compile(
+"""Greatest numbers: bytes of a comment and of a part of it, points and bars of a chart."""
+_LINKABLE: Final = re.compile(
     r"\S*(?:\\(?:[^_*\[\]<>]|<[a-z!/?])|[…!]|%\w|:(?!\d\d\b)\S|//|www\.|[a-z]-\d|\b[\da-f]{7})\S*",
     re.IGNORECASE,
 )
@@ -30,26 +30,26 @@ _ALIVE: Final = re.compile(
 
 
 def fit(blocks: Iterable[Block], most: int = PART) -> str:
-    """Return the first lines of blocks; no name in them notifies anybody or becomes a link."""
+    """Return at most ``most`` bytes of Markdown, in which no name notifies anybody or is a link."""
     lines, shown = blocks_as_markdown(blocks).split("\n"), list[str]()
     for line in lines:
         short = elide(re.sub(r"\S{99,}", lambda word: elide(word[0], 60), line), 1500)
-        inert = _ALIVE.sub(lambda word: in_code(re.sub(r"\\(.)", r"\1", word[0])), short)
-        most -= len(inert.encode()) + 1
+        safe_line = _LINKABLE.sub(lambda word: in_code(re.sub(r"\\(.)", r"\1", word[0])), short)
+        most -= len(safe_line.encode()) + 1
         if most < 0:
             shown.append(f"\n*Left out here: {len(lines) - len(shown)} lines.*")
             break
-        shown.append(re.sub(r"(?<=\w) \\> ", " > ", inert))
+        shown.append(re.sub(r"(?<=\w) \\> ", " > ", safe_line))
     return "\n".join(shown).strip() + "\n"
 
 
 def in_code(text: str) -> str:
-    """Return text as code, without what would end the code or the cell of a table."""
+    """Return text as code, without characters that would end the code or a table's cell."""
     return f"`{elide(text, 600).translate({96: 39, 124: 166})}`"
 
 
 def levels(pairs: Sequence[tuple[float, float]]) -> str:
-    """Return percents of base and new as a chart of Mermaid; empty for less than two."""
+    """Return a Mermaid chart of pairs of base and new, in percent; empty for fewer than two."""
     pairs = [pair for pair in pairs if all(map(defined, pair))][:: len(pairs) // POINTS + 1]
     if len(pairs) < 2:
         return ""
@@ -59,14 +59,14 @@ def levels(pairs: Sequence[tuple[float, float]]) -> str:
 
 
 def changes(rows: Sequence[tuple[str, float]]) -> str:
-    """Return the largest changes as a chart of Mermaid, the worst first; empty without any."""
+    """Return a Mermaid chart of the largest changes, fractions, the worst first; or nothing."""
     rows = sorted((row for row in rows if row[1] and defined(row[1])), key=lambda row: -abs(row[1]))
     rows = sorted(rows[:BARS], key=lambda row: -row[1])
     most = round(100 * max((abs(y) for _, y in rows), default=0), 3)
     names = [re.sub(r"[^\w .,'…()/-]", "·", elide(name, 32)) for name, _ in rows]
     labels = (f'"{name} {plain_points(y)}"' for name, (_, y) in zip(names, rows, strict=True))
     lines = [f"x-axis [{', '.join(labels)}]", f'y-axis "points" 0 --> {most}']
-    for sign in (1, -1):  # Mermaid draws no bar below 0, and none that ends before it begins
+    for sign in (1, -1):  # Mermaid draws no bar for a value below 0
         ends = [round(100 * sign * y, 3) if sign * y > 0 else -most for _, y in rows]
         lines.append(f"bar {ends}")
     return _mermaid(" horizontal", 90 + 32 * len(rows), (WORSE, BETTER), *lines) if rows else ""
@@ -79,7 +79,7 @@ def _mermaid(kind: str, height: int, colours: Sequence[str], *lines: str) -> str
 
 
 def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskChange, str, str]:
-    """Return a mask that is surely worse, else the focus, with its ERR and how it changed."""
+    """Return a surely worse mask, else the focus; its ERR in words; and a word for its change."""
     masks = comparison.finals() or comparison.changes
     focus = focus_of([row.variant for row in masks])
 
@@ -96,7 +96,7 @@ def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskC
 
 
 def badge(comparison: Comparison, limits: Sequence[Judgement]) -> str:
-    """Return ERR and its change as SVG, with a title for screen readers."""
+    """Return an SVG with ERR and its change, and a title for screen readers."""
     _, text, tone = standing(comparison, limits)
     title, shown = escape(elide(f"ERR of {text}, {tone}", 200)), text.rpartition(": ")[2]
     colour, width = {"better": "#1a7f37", "worse": "#cf222e"}.get(tone, "#59636e"), 6 * len(shown)

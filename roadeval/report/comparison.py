@@ -26,9 +26,9 @@ from roadeval.results.sentences import correction, marked_interval
 
 Inspect = Callable[[str, int], str]
 Row = MaskChange | MovedFrame | compare.RegionChange | compare.DriveChange | compare.ClassChange
-"""A fact on a variant of a new result."""
+"""A fact about a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
-"""The function that makes a row's cell in each column, by the columns' titles."""
+"""For the title of each column, the function that makes the cell of a row."""
 NAMED: Final = 20
 """Greatest number of drives in the table of a mask's changed drives."""
 CHANGE: Final = ("base %", "new %", "change", "interval")
@@ -47,9 +47,9 @@ def document(
 ) -> blocks.Report:
     """Return a comparison as a document.
 
-    ``judgements`` judge the limits of the command, ``over_drive`` are charts of the masks' rates
-    over the drive, if any, and ``inspect`` returns the command that opens a frame of a result, by
-    the result's label; None: no commands.
+    ``judgements`` judge the limits of the command; ``over_drive`` has charts of the masks' rates
+    over the drive, or none; ``inspect`` returns the command that opens a frame of the result with
+    a label, and None leaves the commands out.
     """
     labels = [result.label for result in comparison.results]
     sizes = [
@@ -93,7 +93,7 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
 def comment(
     comparison: Comparison, judgements: Sequence[Judgement], over: Sequence[Chart], command: str
 ) -> str:
-    """Return a comparison as Markdown for one comment; ``command`` repeats it."""
+    """Return a comparison as the Markdown of one comment; ``command`` makes it again."""
     mask, text, head = standing(comparison, judgements)
     if judgements:
         failed = [limit.condition.text for limit in judgements if limit.holds is not False]
@@ -134,7 +134,7 @@ def _warnings(comparison: Comparison) -> Iterator[Block]:
 def overview(
     comparison: Comparison, judgements: Sequence[Judgement], most: int | None = None
 ) -> Iterator[Block]:
-    """Yield the changes: limits, the verdict, settings, all rates, and where masks differ.
+    """Yield the limits, the verdict, changed settings, all rates, and where masks differ.
 
     ``judgements`` judge the limits of the command; at most ``most`` changed settings are named.
     """
@@ -147,7 +147,7 @@ def overview(
 
 
 def limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
-    """Yield the judged limits of a command: those exceeded, not judged, and kept."""
+    """Yield the limits of a command: first the exceeded, then the unjudged, then the kept ones."""
     for title, kind, tone in (
         ("Limits exceeded", True, "warning"),
         ("Not judged", None, "warning"),
@@ -159,7 +159,7 @@ def limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
 
 
 def _changes(comparison: Comparison) -> Iterator[Block]:
-    """Yield a table of each result: ERR of each stage, and every rate of final masks."""
+    """Yield a table for each result: ERR of each stage, and every rate of the final masks."""
     base = comparison.results[0].label
     alone = all(row.result == row.variant for row in comparison.changes)
     changed = _changed(comparison)
@@ -198,9 +198,9 @@ def _changed(comparison: Comparison) -> list[MaskChange]:
 
 
 def _table(rows: Sequence[Row], columns: Columns, legend: str = "") -> Table:
-    """Tabulate rows: their result, unless it is always the same, their variant, and columns.
+    """Tabulate rows: the result, unless there is only one, the variant, and ``columns``.
 
-    A rule stands above the first row of each further result.
+    A rule separates the rows of different results.
     """
     names: Columns = {"result": lambda row: row.result, "variant": lambda row: row.variant}
     results = [row.result for row in rows]
@@ -263,7 +263,7 @@ def _details(comparison: Comparison, inspect: Inspect | None = None) -> Iterator
 
 
 def changed_drives(comparison: Comparison, most: int = NAMED) -> Iterator[Block]:
-    """Yield a table for each mask of the drives that changed, the surest first."""
+    """Yield, for each mask, a table of the drives that changed, the surest first."""
     for (result, variant), drives in groupby(comparison.drives, _MASK):
         if rows := [row for row in drives if row.changed]:
             shown = f" ({most} of {len(rows)})" if len(rows) > most else ""
@@ -284,7 +284,7 @@ def changed_drives(comparison: Comparison, most: int = NAMED) -> Iterator[Block]
 
 
 def _change(ends: Callable[[Any], str]) -> Columns:
-    """Return the columns of a change of ERR; ``ends`` writes its interval."""
+    """Return the columns of a change of ERR; ``ends`` returns the text of its interval."""
     cells: tuple[Callable[[Any], Cell | str], ...] = (
         lambda row: percent(row.base),
         lambda row: percent(row.new),
@@ -295,7 +295,7 @@ def _change(ends: Callable[[Any], str]) -> Columns:
 
 
 def _plot(comparison: Comparison) -> Iterator[Block]:
-    """Yield the change of the first mask on every drive."""
+    """Yield a chart of the change of the first mask on every drive."""
     import pandas as pd
 
     mask, group = next(groupby(comparison.drives, _MASK))

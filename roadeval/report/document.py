@@ -29,17 +29,17 @@ from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.fleet import FleetFolder
 
 ACROSS: Final = 6
-"""Worst frames of a fleet beside each other on a page."""
+"""Number of pictures of worst frames in a row on the page of a fleet."""
 Section = Callable[[Any], Iterable[Block]]
 WHY: Final = (classes.section, slices.when_it_fails, disturbances.section)
-"""The sections on what goes wrong, of a drive or of many."""
+"""The sections on what goes wrong, for a drive or for many."""
 SCORED: Final = (
     *(drive.filter_effect, drive.regions, *WHY, ground.on_the_ground),
     *(drive.stages, drive.thresholds),
 )
-"""The sections of a drive with truth; without truth there is one on its masks."""
+"""The sections of a drive with truth; a drive without truth has one section on its masks."""
 RIG: Final = (rig.cameras, drive.filter_effect, disturbances.section, rig.each_camera)
-"""The sections of several cameras of a drive."""
+"""The sections of a drive with several cameras."""
 
 
 def document(findings: Findings | FleetFolder) -> Report:
@@ -63,8 +63,8 @@ def page_document(
 ) -> Report:
     """Return the report as a page: with a browser of frames, or a table of all drives.
 
-    ``worst_frames`` limits the pictures of worst frames of many drives, those over all and those
-    drive by drive; the page is for a ``folder``, from which pages of drives are linked.
+    For many drives ``worst_frames`` limits the pictures of worst frames, over all drives and drive
+    by drive; links to the pages of drives are relative to ``folder``.
     """
     if isinstance(findings, FleetFolder):
         along = partial(drives.along, most=worst_frames, beside=folder)
@@ -74,7 +74,7 @@ def page_document(
         return _compose(findings, *parts, provenance.of_drives)
     if findings.cameras:
         return _compose(findings, *RIG, provenance.section)
-    if browsed and browsed.film:  # which shows more
+    if browsed and browsed.film:  # the film shows more than the thumbnails
         findings = replace(findings, thumbnails=())
     parts = (drive.masks,)
     if findings.facts.totals:
@@ -113,7 +113,7 @@ def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
             yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
         if facts.drive.rate_hz:
             yield f"{facts.drive.rate_hz:.4g} Hz"
-    if preset and {FILTERED, UNFILTERED} & {*ran}:  # else its chain did not run
+    if preset and {FILTERED, UNFILTERED} & {*ran}:  # else no variant used the preset
         yield f"preset {preset}"
     if version:
         yield f"roadeval {version}"

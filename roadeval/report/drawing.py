@@ -19,17 +19,17 @@ from roadeval.data.words import MINUS
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 
 MARKED: Final = 40
-"""Greatest number of marks along a line: a line with more points has none."""
+"""Greatest number of marks along a line: a line with more points has no marks."""
 ROOM: Final = 0.06
-"""Share of an axis after its last tick: room for half of a number of three digits on a
-telephone."""
+"""Share of an axis after its last tick, so that on a telephone half of a number of three digits has
+room there."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 5
 _STEPS: Final = (1, 2, 2.5, 5, 10)
 
 Point = tuple[float, float]
 Tick = tuple[float, str]
-"""A place on an axis, from the left or the bottom, with its number or name."""
+"""A place on an axis, in percent from the left or the bottom, with its number or name."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class AxisRange:
         return round(100 * (value - self.low) / (self.high - self.low), 3)
 
     def down(self, value: float) -> float:
-        """Return the place of a value from the top."""
+        """Return the place of a value from the top, from 0 to 100."""
         return round(100 - self.percent(value), 3)
 
 
@@ -109,10 +109,10 @@ class Mark:
     look: Look
     at: float
     text: str
-    """The number in words, with its interval."""
+    """The name, the number and its interval as text."""
     low: float | None = None
     high: float | None = None
-    """Ends of the interval that lie within the chart."""
+    """Ends of the interval, cut off at the edges of the chart; None without an interval."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class MarkRow:
     name: str
     marks: Sequence[Mark]
     share: float | None
-    """The width of the pale bar behind them."""
+    """The width of the pale bar behind the marks, in percent; None without a bar."""
     sums: bool
     """Whether a rule lies above the row."""
 
@@ -135,17 +135,17 @@ class PlacedChart:
     title: str
     """The title with the unit."""
     across: str
-    """The quantity on the bottom axis; empty if its names tell it."""
+    """The quantity on the bottom axis; empty if the axis has names."""
     x: AxisRange
     y: AxisRange
     """The ranges of the axes."""
     x_ticks: Sequence[Tick]
     y_ticks: Sequence[Tick]
     zero: float | None
-    """The place of zero, from the left or the bottom; None at the edge or outside."""
+    """The place of zero from the left or the bottom; None if zero is not inside the chart."""
     level: float | None
     band: tuple[float, float] | None
-    """The place of the chart's level, and the top and height of its interval, if any."""
+    """The place of the chart's level from the top, and the top and height of its interval."""
     shapes: Sequence[Shape] = ()
     """The series of a chart of lines."""
     rows: Sequence[MarkRow] = ()
@@ -153,7 +153,7 @@ class PlacedChart:
 
 
 def place_chart(chart: Chart, frames: AxisRange | None = None) -> PlacedChart:
-    """Return a chart with its places; ``frames`` is the range of a chart along the drive."""
+    """Return a chart with its places; ``frames`` is the axis of charts along the drive."""
     y = AxisRange(*chart.y_range) if chart.y_range else _range_of_values(chart)
     if is_rows := chart.kind is ChartKind.MARKS:
         y = _with_room(y)
@@ -190,7 +190,7 @@ def _positions(chart: Chart, frames: AxisRange | None) -> tuple[AxisRange, list[
         x = x if chart.low else _with_room(x)
         return x, _number_ticks(x)
     x = AxisRange(-0.3, len(chart.names) - 0.7)
-    # Many names, as those of runs, do not fit beside each other.
+    # Many names, such as names of runs, do not fit beside each other.
     room = max(34 // max(map(len, chart.names), default=1), 1)
     step = -(-len(chart.names) // room) if len(chart.names) > _X_TICKS else 1
     shown = range(0, len(chart.names), step)
@@ -245,7 +245,7 @@ def _rows(chart: Chart, values: AxisRange) -> Iterator[MarkRow]:
 
 
 def values(chart: Chart, placed: PlacedChart) -> dict[str, Any]:
-    """Return the values that a page's script shows, as JSON has them; None where undefined."""
+    """Return the values that a page's script shows, for JSON; undefined values are None."""
     level = chart.level
     ends = ("value", "low", "high")
     return {

@@ -21,6 +21,7 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from matplotlib.transforms import Bbox, TransformedBbox
 
 from roadeval.data import BASELINE, FILTERED, IGNORE, UNFILTERED, Rgb, as_plain
+from roadeval.data.words import counted
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.tables import finals, values_of
 from roadeval.report.chart import FAINT, thin
@@ -44,14 +45,14 @@ EDGE: Final = 0.1
 AXIS: Final = 0.85
 FOOT: Final = 0.45
 GAP_OF_AXES: Final = 0.15
-"""Inches at the edges of a figure, left of its axes, below them, and between two of them."""
+"""Inches at a figure's edges, to the left of its axes, below its axes, and between two axes."""
 NARROW: Final = 5
-"""Width in inches from which a figure has room for letters of full size."""
+"""Inches across a figure below which its letters are smaller."""
 HANDLE: Final = 2.6
-"""Length of a line in a legend, in its letters' size."""
+"""Length of a line in a legend, in sizes of its letters."""
 LETTERS: Final = 9
 SMALL: Final = 8
-"""Points of labels and legends, and of the ticks' labels."""
+"""Sizes in points: letters of labels and legends, and of the ticks' labels."""
 INK: Final = "#222222"
 SHORT: Final = "#E6E6E6"
 """The shade behind a last point that is the mean of fewer frames."""
@@ -94,13 +95,13 @@ def write_figures(
     titled: bool = True,
     kinds: Sequence[FileKind] = ("png", "pdf"),
 ) -> list[Path]:
-    """Write every figure that has something to draw in these kinds of files; return the files.
+    """Write every figure that has something to draw as files of ``kinds``; return their paths.
 
-    The folder is made if it is not there. ``windows`` are the rows of ``windows.csv``, of any
-    number of variants, or no rows without truth; ``examples`` are a few frames, for figure 2;
-    ``camera`` is the name of a camera of a rig, for titles and the files' names. Figures are
-    ``width`` inches across. An OSError if the folder cannot be made; a `ReportError` if a file, or
-    the system's folder for temporary files, cannot be written.
+    The folder is made if it is missing. ``windows`` are the rows of ``windows.csv``, of any number
+    of variants, or no rows without truth; ``examples`` are a few frames for figure 2; ``camera`` is
+    the name of a camera of a rig, for titles and file names. Figures are ``width`` inches across.
+    An OSError if the folder cannot be made; a `ReportError` if a file, or the system's folder for
+    temporary files, cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     drive = f"{drive}, {camera}" if camera else drive
@@ -139,7 +140,7 @@ MARKED: Final = 25
 """Greatest number of markers along a line; a line with more points has markers at regular
 distances."""
 CROWDED: Final = 150
-"""More windows than this are drawn as means of neighbours."""
+"""Greatest number of points of a line; more windows are drawn as means of neighbours."""
 _LABELS: Final = {
     FILTERED: "filtered: with the shadow filter",
     UNFILTERED: "unfiltered: without it",
@@ -153,7 +154,7 @@ _DASHES: Final = {
 }
 _MARKS: Final = {"circle": "o", "square": "s", "triangle": "^", "diamond": "D", "cross": "x"}
 _LONGEST: Final = 80
-"""Letters of a variant's name that fit in a line of the legend."""
+"""Greatest number of letters of a name in the legend."""
 ERROR_RATE: Final = "fig3a_error_rate"
 FP_FN_RATE: Final = "fig3b_fp_fn_rate"
 OVER_DRIVE: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
@@ -170,9 +171,9 @@ OVER_DRIVE: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
 
 
 def over_drive(name: str, drive: str, windows: pd.DataFrame, width: float = WIDTH) -> Figure:
-    """Draw a figure of `OVER_DRIVE`: each variant's final mask, one rate below the other.
+    """Draw a figure of `OVER_DRIVE`: the rates of each variant's final mask, one below the other.
 
-    Without the name of a ``drive`` a figure has no title.
+    ``drive`` is the drive's name for the title; if it is empty, the figure has no title.
     """
     what, rates = OVER_DRIVE[name]
     title = f"{what} on {drive}" if drive else ""
@@ -182,7 +183,7 @@ def over_drive(name: str, drive: str, windows: pd.DataFrame, width: float = WIDT
     short = short_end(windows, CROWDED)
     size, words = (SMALL, {}) if width < NARROW else (LETTERS, _LABELS)
     names = [words.get(series.name, series.name) for series in charts[0].series]
-    names += [f"mean of {short[0]}"] if short else []
+    names += [f"mean of {counted(short[0], 'frame')}"] if short else []
     labels = [elide(name, _LONGEST) for name in names]
     longest = size * (0.57 * max(map(len, labels)) + HANDLE + 2)
     columns = min(max(int((72 * across + 1.2 * size) // longest), 1), 3)
@@ -248,9 +249,9 @@ def _draw_rate(ax: Axes, chart: Chart) -> None:
 
 
 def _titled(title: str, about: str, width: float, left: float, height: float) -> Figure:
-    """Return a figure with ``height`` inches below a title and a text, if it has a title.
+    """Return a figure with a title and a text, unless the title is empty, above ``height`` inches.
 
-    Both are ``left`` inches from the edge.
+    The title and the text are ``left`` inches from the edge.
     """
     bold: dict[str, Any] = {"size": 11, "weight": "bold", "color": INK, "va": "top"}
     faint: dict[str, Any] = {"size": 8.5, "color": FAINT, "va": "top"}
@@ -275,7 +276,7 @@ GAP: Final = 0.05
 
 
 def road_masks(drive: str, examples: Sequence[ExampleFrame], width: float = WIDTH) -> Figure:
-    """Draw figure 2 of the paper: the image, and over it each variant's mask, and the truth."""
+    """Draw figure 2 of the paper: the image alone, with each variant's mask, and with the truth."""
     rows = [*pictures_of([example.small() for example in examples])]
     pixels_down, pixels_across = rows[0]["camera image"].shape[:2]
     column_width = (width - LEFT) / len(rows[0])
@@ -319,7 +320,7 @@ def road_masks(drive: str, examples: Sequence[ExampleFrame], width: float = WIDT
 
 
 class FigurePicture(FigureImage):
-    """An ``(H, W, 3)`` uint8 RGB image that fills a box, given in shares of its figure.
+    """An ``(H, W, 3)`` uint8 RGB image that fills a box; the box is in shares of the figure.
 
     Matplotlib's own method takes some ten times as long: it resizes a picture with filters that
     make no visible difference here, and stores it in an SVG as PNG. Typst copies a JPEG into a PDF,

@@ -1,9 +1,9 @@
-"""Frames as videos: a drive for a page with its camera, truth and masks, and clips of errors.
+"""Frames as videos: the film of a drive for a page, and clips of errors.
 
-Every picture of the video holds all panels of one frame beside each other, so one seek shows a
-frame of all of them. Truth, masks and probabilities are shades of grey; the page paints errors and
-masks over the camera, so any variant can be looked at, and any threshold. VP9 in WebM plays in
-every present browser. A clip is for players and chats, too: H.264 in MP4, or a GIF.
+Each picture of the film holds all panels of one frame beside each other: the camera, the truth and
+the masks, so one seek shows them all. Truth, masks and probabilities are shades of grey; the page
+paints errors and masks over the camera, for any variant and any threshold. VP9 in WebM plays in
+every current browser. A clip, for players and chats, is H.264 in MP4, or a GIF.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ NO_MASK: Final = 128
 _WIDTHS: Final = {4: 480, 9: 400, math.inf: 320}
 """Greatest width of a panel in pixels, by the number of panels."""
 _KEYFRAMES: Final = 10
-"""Frames from one keyframe to the next: a seek decodes at most so many."""
+"""Frames from one keyframe to the next: the most frames that a seek decodes."""
 _CODECS: Final = {"webm": "libvpx-vp9", "mp4": "libx264", "gif": "gif"}
 _NAMED: Final = {"green": TP, "orange-red": FP, "pink": FN, "grey": GREY}
-"""The codecs of containers, and the colours of captions by their names."""
+"""The codec of each container, and the colours that captions name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Film:
     panels: Sequence[str]
     """Names of the panels, row by row."""
     columns: int
-    """Panels beside each other."""
+    """Number of panels in a row."""
     width: int
     height: int
     """Size of a panel in pixels."""
@@ -63,7 +63,7 @@ class Film:
 
 
 def shade_truth(truth: Plane) -> Plane:
-    """Return a truth in shades: non-road black, road white, ignored pixels between."""
+    """Return a truth as ``(H, W)`` uint8 shades: 0 non-road, 255 road, `NO_MASK` ignored."""
     return np.where(truth == IGNORE, NO_MASK, np.where(truth, 255, 0)).astype(np.uint8)
 
 
@@ -76,7 +76,7 @@ def make_film(
     """Return the video of frames, of at most about ``room`` bytes.
 
     ``read`` returns the panels of a frame by their names: ``(H, W, 3)`` uint8 RGB, or ``(H, W)``
-    uint8 shades; a panel that it leaves out is grey. All frames have the size of the first one.
+    uint8 shades; a missing panel is grey. All frames have the size of the first one.
     """
     first = read(frames[0])[CAMERA]
     most = next(width for count, width in _WIDTHS.items() if len(panels) <= count)
@@ -95,7 +95,7 @@ def make_film(
                 picture[top : top + height, left : left + width] = _fit(panel, width, height)
         return picture
 
-    # One quality, and less if it would not have room.
+    # The quality is the same for every film, and lower if the film would exceed its room.
     options = {"crf": "36", "deadline": "realtime", "cpu-used": "8", "row-mt": "0"}
     options["b"] = str(int(8 * room * FPS / len(frames)))
     content = encode(map(mosaic, frames), "webm", Fraction(FPS), options)
@@ -103,9 +103,9 @@ def make_film(
 
 
 def _fit(panel: Plane, width: int, height: int) -> Plane:
-    """Return a panel in its size; shades have a third axis of one, and none are mixed.
+    """Return a panel as ``(height, width, 3)`` uint8 RGB, or ``(height, width, 1)`` uint8 shades.
 
-    The mean of road and non-road would be the shade of ignored pixels.
+    Shades are not mixed: the mean of road and non-road would be the shade of ignored pixels.
     """
     import cv2
 
@@ -115,7 +115,7 @@ def _fit(panel: Plane, width: int, height: int) -> Plane:
 
 
 def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[str, str]) -> bytes:
-    """Encode pictures with even sides, ``rate`` a second, as ``webm``, ``mp4`` or ``gif``."""
+    """Return ``(H, W, 3)`` uint8 RGB pictures with even sides as a video, ``rate`` a second."""
     import av
 
     file = io.BytesIO()
@@ -136,7 +136,7 @@ def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[s
 
 
 def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) -> Rgb:
-    """Return panels with titles, 960 to 1920 pixels across, and a line on colours and drive."""
+    """Return titled panels, 960 to 1920 pixels across, above a line on colours and the drive."""
     import cv2
 
     painted = np.hstack([paint(panel) for panel in panels])
@@ -154,7 +154,7 @@ def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) 
 
 
 def _line(texts: Sequence[str], width: int) -> Rgb:
-    """Return a black line with texts in the colours that they name, in letters that fit."""
+    """Return ``(24, width, 3)`` uint8 RGB: texts on black, in the colours that they name."""
     import cv2
 
     font, gap, left = cv2.FONT_HERSHEY_SIMPLEX, 14, 7.0

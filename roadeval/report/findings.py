@@ -1,4 +1,4 @@
-"""The content of a report on one drive: facts, tables, and frames that a job picked."""
+"""The content of a report on one drive: facts, tables, and the frames to show."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class NotableFrame:
     frame: int
     stamp_ns: int
     variant: str
-    """The variant that fails or changes, in a row of a table the focus."""
+    """The variant that fails or changes; in a table of frames the focus."""
     rates: Mapping[str, Mapping[str, float]]
-    """Rates of each variant's final mask, as in short tables; without truth its signs of doubt."""
+    """By variant: the final mask's rates, as in short tables; without truth its signs of doubt."""
     change: float | None = None
     """The filter's effect on ERR, or None."""
     notes: Sequence[str] = ()
@@ -54,7 +54,7 @@ class NotableFrame:
 
     @property
     def error(self) -> float:
-        """Its ERR, or its first sign of doubt; -1 if none is defined."""
+        """ERR of `variant`, or without truth its first sign of doubt; -1 if none is defined."""
         rates = self.rates.get(self.variant, {})
         return next((rates[by] for by in (TESTED, *SIGNS) if defined(rates.get(by))), -1.0)
 
@@ -66,20 +66,20 @@ class Findings:
     path: str
     """The recording or folder, as the user named it."""
     facts: Facts
-    """The facts; of an incomplete run those that its tables give."""
+    """The facts; an incomplete run has only the facts that its tables give."""
     table: Callable[[str], pd.DataFrame] = lambda name: read_table(name, "")
     """The function that returns a table by its name; by default without rows."""
     complete: bool = True
     """Whether the run reached its end."""
     again: str = ""
-    """The command that makes the results again; empty if their configuration is lost."""
+    """The command that makes the results again; empty if the configuration is lost."""
     inspect: Callable[[int], str] | None = None
     """The function that returns the command to open a frame in the viewer; None without a
     recording."""
     properties: Mapping[str, Any] = field(default_factory=dict)
     """The recording's properties, about its origin."""
     pictured: int = 0
-    """Number of evaluated frames with pictures, or without truth of all frames with pictures."""
+    """Number of evaluated frames with pictures; of a drive without any, of all with pictures."""
     examples: Sequence[ExampleFrame] = ()
     """Frames for figure 2."""
     thumbnails: Sequence[LayerImage] = ()
@@ -87,7 +87,7 @@ class Findings:
     worst: Sequence[NotableFrame] = ()
     helped: Sequence[NotableFrame] = ()
     harmed: Sequence[NotableFrame] = ()
-    """Frames to look at: those with the greatest errors, and the greatest effects of the filter."""
+    """Frames with the greatest errors, and frames that the filter helped or harmed most."""
     cameras: Mapping[str, Findings] = field(default_factory=dict)
     """Findings of each camera of a rig, by its name; a rig has no tables of its own."""
     camera: str = ""
@@ -119,7 +119,7 @@ class Findings:
 
     @cached_property
     def regions(self) -> pd.DataFrame:
-        """See `roadeval.evaluation.tables.by_region`."""
+        """The rows of `roadeval.evaluation.tables.by_region`: rates and shares by region."""
         return tables.by_region(self.table("regions"))
 
     @cached_property
@@ -133,7 +133,7 @@ class Findings:
 
     @cached_property
     def error_parts(self) -> Mapping[str, Mapping[str, float]]:
-        """The parts of each variant's mean ERR, see `roadeval.evaluation.tables.causes`."""
+        """Mean parts of ERR by variant and part, see `roadeval.evaluation.tables.causes`."""
         frames = self.table("frames")
         names = [name for name in values_of(frames, "variant") if name != BASELINE]
         means = ((name, tables.causes(frames, name).mean()) for name in names)
@@ -141,7 +141,7 @@ class Findings:
 
     @cached_property
     def heatmaps(self) -> Mapping[str, Floats]:
-        """Shares of FP and FN, ``(2, rows, columns)`` by variant; NaN where never labelled."""
+        """``(2, rows, columns)`` by variant: shares of FP and FN; NaN where never labelled."""
         maps = {}
         for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))
@@ -151,7 +151,7 @@ class Findings:
 
     @cached_property
     def by_distance(self) -> Mapping[tuple[str, str], Interval]:
-        """Mean ERR with its interval, by band of distance and variant."""
+        """Mean ERR with its interval, as fractions, by band of distance and variant."""
         rows, settings = tables.finals(self.table("regions")), self.facts.evaluation
         rows = rows[rows["N"] > 0]
         errors = (rows["FP"] + rows["FN"]) / rows["N"]

@@ -24,9 +24,9 @@ from roadeval.results.sentences import marked_interval
 
 BARS: Final = "▁▂▃▄▅▆▇█"
 SPARKS: Final = 30
-"""Letters of a rate over the runs in a table."""
+"""Greatest number of bars in the cell that shows a rate over the runs."""
 ROWS: Final = 10
-"""Greatest number of drives of an event, and of parts of the pixels with a chart."""
+"""Greatest number of drives of an event, and of regions, classes and tags with a chart."""
 Rows = list[list[Cell | str]]
 
 
@@ -73,7 +73,7 @@ def markdown(history: History) -> str:
 
 
 def rates_table(lines: Sequence[Line]) -> Table:
-    """Tabulate lines: their rates in the first and the last run, and their levels between."""
+    """Tabulate each line's first and last rate, and bars for its levels over the runs."""
     rows = [[line.variant, line.title, *_over_runs(line.rates, line.levels)] for line in lines]
     columns = ["variant", "rate", "first %", "last %", "over the runs"]
     breaks = [n for n, row in enumerate(rows) if n and row[0] != rows[n - 1][0]]
@@ -81,7 +81,7 @@ def rates_table(lines: Sequence[Line]) -> Table:
 
 
 def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
-    """Return the first and the last rate, and bars for the runs, from the least to the greatest.
+    """Return the first and the last defined rate, and bars from the least level to the greatest.
 
     If several runs share a bar, it shows their mean; a run without a level is a space.
     """
@@ -91,14 +91,14 @@ def _over_runs(rates: Floats, levels: Floats) -> tuple[str, str, str]:
     parts = [part[~np.isnan(part)] for part in np.array_split(levels, min(SPARKS, len(levels)))]
     means = np.array([part.mean() if len(part) else np.nan for part in parts])
     low, high = np.nanmin(means), np.nanmax(means)
-    # If a rate does not change, its bars are low, independent of rounding.
+    # If a rate does not change, all its bars are low, whatever the rounding.
     places = np.nan_to_num((means - low) / max(high - low, 1e-4) * (len(BARS) - 1)).round()
     bars = [" " if np.isnan(m) else BARS[int(p)] for m, p in zip(means, places, strict=True)]
     return percent(float(defined[0])), percent(float(defined[-1])), "".join(bars)
 
 
 def _figures(history: History) -> Iterator[Block]:
-    """Yield charts of the levels: of all pixels, then of what moved most."""
+    """Yield charts of the levels: of all pixels, then of the parts that changed most."""
     masks = [line for line in history.lines if line.kind == ALL]
     by_rate = {rate: [m for m in masks if m.rate == rate] for rate in (m.rate for m in masks)}
     yield blocks.Figure(
@@ -112,7 +112,7 @@ def _figures(history: History) -> Iterator[Block]:
 
 
 def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
-    """Return a chart of the levels of some lines over the runs, with the steps as marks."""
+    """Return a chart of the levels of ``lines`` over the runs, with their steps as marks."""
     by_variant, series = looks([line.variant for line in lines]), []
     places, names = range(len(history.runs)), [run.title for run in history.runs]
     for line in lines:
@@ -127,7 +127,7 @@ def _chart(history: History, title: str, lines: Sequence[Line]) -> Chart:
 
 
 def _details(history: History, event: Event) -> Details:
-    """Return what an event changed, what else differs there, and the drives that carry it."""
+    """Return an event's reasons, the rates, drives and frames that changed, and a command."""
     first, run = event.first, history.runs[event.run]
     parts: list[Block] = [BulletList("What changed there", event.reasons)]
     changes: Rows = [
@@ -154,7 +154,7 @@ def _details(history: History, event: Event) -> Details:
 
 
 def _drives_table(history: History) -> Details:
-    """Return the error rate of the focus on each drive, run by run."""
+    """Return a table of the error rate of the focus on each drive, over the runs."""
     import pandas as pd
 
     rows: Rows = []

@@ -21,11 +21,11 @@ WIDTH: Final = 420
 """Greatest width of a picture in pixels: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
 FINEST: Final = 95
-"""Quality of a JPEG in a report, and in a figure of its own."""
+"""Qualities of JPEGs: in a report, and in a figure of the paper."""
 FADED: Final = 5
-"""Divisor of the camera's contrast where there is no mask."""
+"""Divisor of the contrast of an image that has no mask."""
 DARKEN: Final = 0.75
-"""Share of the camera's brightness that remains below an overlay."""
+"""Share of the image's brightness that remains below an overlay."""
 
 _LEVELS: Final = np.arange(256, dtype=np.uint8)[:, None]
 
@@ -40,8 +40,8 @@ class LayerImage:
     """``(H, W, 3)`` uint8 RGB: the camera's image."""
     spec: LayerSpec | None = None
     array: npt.NDArray[Any] | None = None
-    """The layer, as in `roadeval.data.Layer`; None for the camera's image alone. A scalar map is in
-    its own unit."""
+    """The layer, as in `roadeval.data.Layer`; None for the camera's image alone. The values of a
+    scalar map are in its unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +54,10 @@ class ExampleFrame:
     truth: Truth | None
     """``(H, W)`` uint8 (0, 1, 255)."""
     masks: Mapping[str, Mask]
-    """``(H, W)`` uint8 (0, 1) by variant; masks of another system may be missing."""
+    """``(H, W)`` uint8 (0, 1) by variant; a method from outside may lack the frame's mask."""
 
     def small(self) -> ExampleFrame:
-        """Return the example in the size of its picture, so that a run can hold a few."""
+        """Return the example reduced to `EXAMPLE_WIDTH` pixels across, to save memory."""
         return ExampleFrame(
             self.frame,
             shrink(self.image, EXAMPLE_WIDTH),
@@ -67,9 +67,9 @@ class ExampleFrame:
 
 
 def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
-    """Yield each example's pictures by their titles: the image, and masks and truth over it.
+    """Yield each example's pictures by their titles: the image alone, with masks, and with truth.
 
-    In place of a missing mask there is a nearly white image. All examples have the same titles.
+    A nearly white image takes the place of a missing mask. All examples have the same titles.
     """
     names = dict.fromkeys(name for example in examples for name in example.masks)
     labelled = any(example.truth is not None for example in examples)
@@ -86,7 +86,7 @@ def pictures_of(examples: Sequence[ExampleFrame]) -> Iterator[dict[str, Rgb]]:
 
 
 def example_grid(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGrid:
-    """Return a row for each frame: the image, and over it each variant's mask, and the truth."""
+    """Return a row for each frame: the image alone, with each variant's mask, and with truth."""
     rows = [*pictures_of(examples)]
     pictures = [
         (title if place else f"frame {example.frame}", jpeg(LayerImage(title, picture)))
@@ -102,7 +102,7 @@ def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
 
 
 def encode_jpeg(image: Rgb, *, finest: bool = False) -> bytes:
-    """Return an image as a JPEG file; in the ``finest``, a line of one pixel keeps its colour."""
+    """Return an image as a JPEG file; if ``finest``, a line of one pixel keeps its colour."""
     import cv2
 
     options = [cv2.IMWRITE_JPEG_QUALITY, FINEST if finest else QUALITY]
@@ -145,7 +145,7 @@ def paint(layer: LayerImage) -> Rgb:
 def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
     """Draw ``(rows, columns)`` shares in shades from white at 0 to the darkest at ``top``.
 
-    ``colour`` is half-way between; NaN is grey.
+    ``colour`` is the shade half-way between the two; NaN is grey.
     """
     levels = np.nan_to_num(shares / (top or 1.0))[..., None]
     white, middle, darkest = np.array([(255, 255, 255), colour, colours.MOST_ERRORS], float)
@@ -159,14 +159,14 @@ def heat_map(shares: Floats, top: float, colour: colours.Colour) -> ImageFile:
 
 
 def fade(image: Rgb) -> Rgb:
-    """Return an image nearly white, which takes the place of a missing mask."""
+    """Return a nearly white image, which takes the place of a missing mask."""
     return np.asarray(255 - (255 - image) // FADED, np.uint8)
 
 
 def shrink(
     image: npt.NDArray[np.uint8], width: int, *, labels: bool = False
 ) -> npt.NDArray[np.uint8]:
-    """Reduce an image to ``width`` pixels across, if it is wider; labels are not mixed."""
+    """Return an image at most ``width`` pixels wide; ``labels`` are not mixed."""
     import cv2
 
     height, wide = image.shape[:2]

@@ -16,16 +16,16 @@ from roadeval.results.facts import Facts, FleetFacts, Totals
 from roadeval.results.sentences import describe_overconfidence, marked_interval
 
 OTHERS: Final = tuple(rate for rate in SHORT if rate != TESTED)
-"""The rates in short tables beside ERR."""
+"""The rates of short tables other than ERR."""
 
 
 def variant_cell(name: str, names: Sequence[str], text: str = "") -> Cell:
-    """Return a variant's name, or a text, with its mark in charts among ``names``."""
+    """Return a cell with a variant's name, or a text, and its mark in charts of ``names``."""
     return Cell(text or name, look=looks(names)[name])
 
 
 def breaks_of(rows: Sequence[Sequence[Cell | str]]) -> list[int]:
-    """Return the rows that begin a part of a table, behind the first: they have a first cell."""
+    """Return the positions of rows with text in their first cell, without the first row."""
     return [place for place, row in enumerate(rows) if place and row[0]]
 
 
@@ -106,8 +106,8 @@ def stages_table(
 def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Table:
     """Tabulate the differences of final masks, over the frames of a drive or over drives.
 
-    A ``brief`` table has the differences alone: neither both errors, nor the numbers of better and
-    worse frames.
+    A ``brief`` table has only the differences, without both errors and without the numbers of
+    better and worse frames.
     """
     effects, names = facts.final_effects, [*facts.finals]
     errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
@@ -143,7 +143,7 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
 
 
 def thresholds_table(curves: Totals, totals: Totals) -> Table:
-    """Tabulate AP and MaxF over all thresholds and ECE, beside F1 of the mask as it is."""
+    """Tabulate AP and MaxF over all thresholds, ECE, and F1 of the mask as it is."""
     rows: list[list[Cell | str]] = [
         [
             variant_cell(variant, [*totals]),
@@ -167,7 +167,7 @@ def thresholds_table(curves: Totals, totals: Totals) -> Table:
 
 
 def cameras_table(facts: Facts) -> Table:
-    """Tabulate ERR of each camera's final masks, and the first difference within each camera."""
+    """Tabulate ERR of each camera's final masks, and the first pair's difference in each camera."""
     names, masks = words.short_names([*facts.cameras]), [*facts.finals]
     pairs = [(effect.variant, effect.base) for effect in facts.final_effects[:1]]
     rows: list[list[Cell | str]] = []

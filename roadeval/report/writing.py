@@ -13,7 +13,7 @@ from roadeval.runtime.files import put, writing
 
 
 def write_file(path: Path, content: bytes) -> Path:
-    """Write a report; an incomplete file never has its name.
+    """Write a file and return its path; an incomplete file never has the name.
 
     A `ReportError` if it cannot be written.
     """
@@ -29,9 +29,9 @@ def write_document(
     markdown: Callable[[], str],
     facts: Callable[[], str],
 ) -> Path:
-    """Write a document as PDF, page, Markdown or JSON, by the file's ending.
+    """Write a document as PDF, page, Markdown or JSON, by the file's ending; return its path.
 
-    A `RoadevalError`, with the document's ``title``, if the ending is another, or the file cannot
+    A `RoadevalError` if the ending is another, with the document's ``title``, or if the file cannot
     be written.
     """
     match path.suffix.lower():
@@ -46,5 +46,5 @@ def write_document(
         case ".json":
             content = facts().encode()
         case _:
-            raise RoadevalError(f"{path}: {title} is written as .pdf, .html, .md, .json")
+            raise RoadevalError(f"{path}: {title} is written as .pdf, .html, .md or .json")
     return write_file(path, content)

@@ -87,7 +87,7 @@ def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tm
     ("words", "code", "said"),
     [
         (["--fail-if", "ERR > 1"], 2, "is no condition"),
-        (["-o", "change.docx"], 2, "end it in .pdf, .html, .md, .json or .svg"),
+        (["-o", "change.docx"], 2, "the name must end in .pdf, .html, .md, .json or .svg"),
         (["--fail-if", "post.net.ERR > 1pp"], 1, "nothing compared is called post.net"),
         (["--variant", "net"], 1, "no variant net"),
     ],

@@ -179,7 +179,7 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     assert errors == sorted(errors, reverse=True)
     assert len({each["drive"] for each in listed}) == 3
     read = here("inspect", fleet, "--list").stdout
-    assert "(at most three per drive, three seconds apart)" in " ".join(read.split())
+    assert "(at most 3 per drive, 3 seconds apart)" in " ".join(read.split())
     assert max(map(len, read.splitlines())) <= 80
     assert "If a recording was not kept, --worst K says how to make it." in read
 

@@ -243,6 +243,7 @@ def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
     assert done.returncode == 0, done.stderr
     assert {each.name for each in (work / "both").iterdir()} == {"street", "second"}
     assert len(Picks.read(work / "both" / "second").picked) == 3
+    assert "results into both/{drive}/labels." in " ".join(done.stdout.split())
     for name in ("street", "second"):
         label(work / "both" / name, truths)
     command = shlex.split(done.stdout.rpartition("next")[2])

@@ -152,6 +152,7 @@ def test_a_results_folder_stands_for_its_recording(recording, tmp_path):
         (("--frames", "400:800"), 1, "drive.rrd: no pictures of such frames"),
         (("--focus", "nobody"), 1, "--focus: there is no variant nobody"),
         (("--frames", "40-80"), 2, "--frames"),
+        (("--frames", "80:40"), 2, "80:40: write the first and the last frame, as 40:80"),
         (("--frames", "4:8", "--worst", "2"), 2, "--worst and --frames do not go together"),
         (("-o", "{drive}.avi"), 1, ".avi: a clip ends in .mp4 or .gif"),
         (("-o", "{drive}.rrd/x"), 1, "drive.rrd"),

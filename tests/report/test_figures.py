@@ -117,7 +117,7 @@ def test_a_long_drive_is_drawn_as_means_of_rows_with_some_marks() -> None:
     assert CROWDED / line.get_markevery() == MARKED
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
     assert line.get_ydata()[0] == pytest.approx(first.mean())
-    assert "the mean of 24 rows of 10 frames" in texts(figure)
+    assert "the mean of 24 windows of 10 frames" in texts(figure)
 
 
 def test_the_legend_reads_row_by_row_in_the_order_of_the_variants() -> None:
@@ -127,11 +127,11 @@ def test_the_legend_reads_row_by_row_in_the_order_of_the_variants() -> None:
     assert names == ["a", "d", "b", "c"]
 
 
-@pytest.mark.parametrize(("last", "said"), [(10, ""), (4, ", the last of 4")])
+@pytest.mark.parametrize(("last", "said"), [(10, ""), (4, ", the last one of 4")])
 def test_a_short_last_point_is_marked_and_said(last: int, said: str) -> None:
     figure = over_drive(FP_FN_RATE, "drive", a_table(3, last=last))
     assert f"is the mean of 10 frames{said};" in texts(figure)
-    assert ("mean of 4" in texts(figure)) == bool(said)
+    assert ("mean of 4 frames" in texts(figure)) == bool(said)
     spans = [[round(p.get_x(), 1), p.get_width()] for ax in figure.axes for p in ax.patches]
     assert spans == [[19.5, 4]] * len(figure.axes) * bool(said)
 

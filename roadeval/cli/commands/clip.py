@@ -13,9 +13,10 @@ from roadeval.cli.arguments import option
 
 
 def _span(text: str) -> range:
-    if not (match := re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)):
+    match = re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)
+    if not match or not (frames := range(int(match[1]), int(match[2]) + 1)):
         raise ValueError(f"{text}: write the first and the last frame, as 40:80")
-    return range(int(match[1]), int(match[2]) + 1)
+    return frames
 
 
 def clip(
@@ -29,7 +30,7 @@ def clip(
         range | None, option("--frames", "One clip, of these frames.", "A:B", parser=_span)
     ] = None,
     focus: arguments.Focus = None,
-    mcap: Annotated[bool, option("--mcap", "Also the log's own messages, as a log.")] = False,
+    mcap: Annotated[bool, option("--mcap", "Log of the messages beside each clip.")] = False,
     quiet: arguments.Quiet = False,
 ) -> int:
     """Film what fails, for people who do not have the data.
@@ -38,8 +39,8 @@ def clip(
         roadeval clip recordings/drive.rrd --frames 40:80 -o turn.mp4 --mcap
 
     Each clip shows 2 s before and after the worst frame of a scene: the errors of the focus, and
-    beside them those of the best other variant. The messages begin 2 s earlier, and 'replay' opens
-    them.
+    beside them the errors of the best other variant. The messages of --mcap begin 2 s earlier;
+    'replay' reads them.
     """
     if worst and frames:
         raise typer.BadParameter("--worst and --frames do not go together")

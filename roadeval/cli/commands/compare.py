@@ -1,4 +1,4 @@
-"""``roadeval compare``: what changed between results, and a guard for a merge."""
+"""``roadeval compare``: what changed between results, and limits that a change must keep."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def compare(
     Drives are paired by name or log, and frames by stamp. Frames that trained either result are
     left out. One drive is judged over its frames, several drives are judged over the drives.
     Results of different drives are not compared. Exit code 4 if a --fail-if condition holds; 1 if
-    one cannot be judged, as when two results share fewer than ten frames, or fewer than half the
-    frames of the smaller one; 3 if drives of a fleet failed, which are in no number, or if a run of
-    the base folder cannot be read.
+    one cannot be judged, for example because two results share fewer than ten frames, or fewer than
+    half the frames of the smaller one; 3 if drives of a fleet failed (no number includes them), or
+    if a run of the base folder cannot be read.
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding

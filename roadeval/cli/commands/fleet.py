@@ -30,7 +30,7 @@ def fleet(
         Path,
         arguments.option(
             "-o --output",
-            "Folder of all results; drives whose results are there are not replayed again.",
+            "Folder of all results; drives that have results there are not replayed again.",
             "FOLDER",
         ),
     ],
@@ -44,8 +44,8 @@ def fleet(
         roadeval fleet drives/ -o all --variant robust --jobs 4
 
     The drives are replayed on this machine or on a cluster. The same command again replays only
-    what is missing or has changed. A drive that cannot be used is a row with the reason, and the
-    exit code is 3 then.
+    what is missing or has changed. A drive that cannot be used has a row with the reason, and
+    the exit code is then 3.
     """
     config = arguments.configuration(options)
     from roadeval.cli.screens import fleet as screen
@@ -63,8 +63,8 @@ def fleet(
         messages.warning(sentence)
     if lines := [*screen.manifest(outcome.facts)]:
         messages.note(
-            "labels differ from drive to drive: state `labels` in a manifest, as drives.toml, and "
-            "give that in place of the drives"
+            "labels differ from drive to drive: state `labels` in a manifest, such as drives.toml, "
+            "and give the manifest in place of the drives"
         )
         for line in lines:
             console.diagnostics().print(line, soft_wrap=True)

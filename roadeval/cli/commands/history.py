@@ -1,4 +1,4 @@
-"""``roadeval history``: since when which rate is worse."""
+"""``roadeval history``: which rates got worse, and since when."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def history(
     *,
     by: Annotated[
         str | None,
-        option("--by", "Label of --label: results with the same value are one run.", "NAME"),
+        option("--by", "Name of a --label: results with the same value are one run.", "NAME"),
     ] = None,
     last: Annotated[
         int,
@@ -38,7 +38,7 @@ def history(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Show since when which rate is worse, over many runs.
+    """Show which rates got worse over many runs, and since when.
 
         roadeval history nightly/
         roadeval history nightly/ --last 10 -o history.html

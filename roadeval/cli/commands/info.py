@@ -25,9 +25,9 @@ def info(
 
         roadeval info drive.mcap
 
-    Shows the topics with their kind, size, number and rate of messages, gaps and damage; and why
-    replay would pick what it picks, or what it would ask for. Without --verify only the indexes of
-    a log of more than 50 MB are read, and of one behind a URL its summary and first messages.
+    It shows each topic's kind, size, number and rate of messages, and gaps; damage; and what replay
+    would pick and why, or what it would ask for. Without --verify, only the indexes of a log of
+    more than 50 MB are read, and only the summary and first messages of a log behind a URL.
     """
     arguments.check_one_camera(options)
     config = arguments.configuration(options)

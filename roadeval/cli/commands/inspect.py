@@ -18,13 +18,13 @@ Listed = Annotated[bool, arguments.option("--list", "List of the worst frames, w
 Frame = Annotated[int | None, arguments.option("--frame", "Frame to open.", "N", min=0)]
 Rank = Annotated[
     int | None,
-    arguments.option("--worst", "Rank of the frame to open; 1 is the worst.", "K", min=1),
+    arguments.option("--worst", "Rank of the frame to open; with --list: how many.", "K", min=1),
 ]
 Focus = Annotated[
     str | None,
     arguments.option(
         "--variant --focus",
-        "Variant that ranks the frames. Default: what you brought, else filtered.",
+        "Variant that ranks the frames by its errors. Default: what you brought, else filtered.",
         "NAME",
     ),
 ]
@@ -69,7 +69,7 @@ def inspect(
 
     opened = arguments.select_camera(Result(recording, focus=focus), camera)
     if opened.fleet and frame is not None:
-        raise typer.BadParameter("--frame does not go with a fleet: give its drive's recording")
+        raise typer.BadParameter("--frame does not go with a fleet: give one drive's recording")
     if not listed:
         _show(opened, frame, worst, file=screenshot)
     else:
@@ -83,7 +83,7 @@ def inspect(
 
 
 def _show(opened: Result, frame: int | None, rank: int | None, *, file: Path | None) -> None:
-    """Open the viewer at a frame, which its number or rank names, or write its picture."""
+    """Open the viewer at a frame, by its number or rank, or write its picture to ``file``."""
     from roadeval.evaluation.metrics import TESTED
     from roadeval.jobs.results import inspect as job
 

@@ -32,7 +32,7 @@ def pick(
     variant: Annotated[
         str | None,
         arguments.option(
-            "--by", "Variant whose masks and uncertainty are used. Default: the first.", "NAME"
+            "--by", "Variant that gives masks and uncertainty. Default: the first.", "NAME"
         ),
     ] = None,
     seed: Annotated[int, arguments.option("--seed", "Random seed.", "N", min=0)] = 0,
@@ -47,7 +47,7 @@ def pick(
     the rates of the whole drive, with an interval. The others are the most uncertain ones, apart
     from each other, to learn from. FOLDER/images has the images, FOLDER/proposals the present
     masks; put the corrected masks into FOLDER/labels. Picking again into the same folder adds
-    frames. A log is replayed first, by the --config of 'replay'; a result is used as it is.
+    frames. A log is replayed first, with the settings of --config; a result is used as it is.
     """
     arguments.check_one_camera(options)
     config = arguments.configuration(options)
@@ -72,13 +72,11 @@ def pick(
         console.say(f"{drive.folder}: {added} to label: {drawn}{uncertain}")
     if drives and not quiet:
         out = console.results()
-        folder = drives[0].folder
+        folder = drives[0].folder if len(drives) == 1 else output / "{drive}"
         out.print(f"Correct {folder}/proposals, and put the results into {folder}/labels.")
         logs, run_toml = join(drive.log for drive in drives), quote(str(drives[0].config))
-        command = f"replay {logs} --config {run_toml} --truth {quote(str(folder))}"
-        if len(drives) > 1:
-            truth = quote(f"{output}/{{drive}}")
-            command = f"fleet {logs} --config {run_toml} --truth {truth} -o labelled"
-        console.show_next(out, f"roadeval {command}")
+        name, more = ("replay", "") if len(drives) == 1 else ("fleet", " -o labelled")
+        truth = quote(str(folder))
+        console.show_next(out, f"roadeval {name} {logs} --config {run_toml} --truth {truth}{more}")
     messages.warn_of_missing_loops()
     return ExitCode.DONE

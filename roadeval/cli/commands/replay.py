@@ -17,7 +17,7 @@ def replay(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Replay a log; record, score and plot every step.
+    """Replay a log, and record, score and plot every step.
 
         roadeval replay drive.mcap
         roadeval replay drive.mcap --truth labels/ --net mine=net.onnx

@@ -55,8 +55,8 @@ def report(
         Literal["drive", "none"],
         arguments.option(
             "--title",
-            "Title of each figure: what it shows and the drive's name, or none, if a text has its "
-            "own captions.",
+            "Title of each figure: what it shows and the drive's name; or none, for a text with "
+            "captions of its own.",
         ),
     ] = "drive",
     open_report: Annotated[

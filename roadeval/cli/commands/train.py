@@ -35,7 +35,7 @@ def train(
 
         roadeval train monday.mcap tuesday.mcap -o city.model
 
-    The training frames are labelled ones, spread evenly over each drive. If no drive has road
+    The training frames are labelled frames, spread evenly over each drive. If no drive has road
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
     Replay never evaluates the training frames, on any drive.
     """

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def show(comparison: Comparison, judgements: Sequence[Judgement], out: Console) -> None:
-    """Print what changed in numbers, and the conditions that do not hold; the others are errors."""
+    """Print the changes in numbers, and the conditions that do not hold (others are errors)."""
     judged = [judgement for judgement in judgements if judgement.holds is not None]
     passed = [judgement for judgement in judged if not judgement.holds]
     blocks = [*overview(comparison, passed, NAMED), *changed_drives(comparison)]

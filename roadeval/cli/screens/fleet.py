@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from roadeval.results.facts import FleetFacts
 
 WORST: Final = 12
-"""Drives in the table of drives."""
+"""Greatest number of drives in the table of drives."""
 NAMED: Final = 5
-"""Drives that are named for each reason of failure."""
+"""Greatest number of drives that are named for one reason, or listed in a manifest."""
 
 
 def show(outcome: FleetOutcome, out: Console) -> None:
@@ -38,7 +38,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     earlier = sum(outcome.counts.values()) - outcome.replayed
     out.print(drives_account(outcome.counts, facts.frames))
     if not outcome.replayed:
-        out.print("All of it was done before.")
+        out.print("All drives were done before.")
     elif earlier > 0:
         out.print(f"{earlier} of them were done before.")
     out.print()
@@ -58,7 +58,7 @@ def show(outcome: FleetOutcome, out: Console) -> None:
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
-    """Yield the warnings, and why drives failed, with the first drives of each reason."""
+    """Yield the warnings, and a sentence for each reason of failure with the first drives."""
     yield from outcome.facts.warnings
     fleet = FleetFolder(outcome.folder)
     failed = fleet.drives.loc[[*outcome.problems]]
@@ -70,7 +70,7 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
 def manifest(facts: FleetFacts) -> Iterator[str]:
     """Yield the lines of a manifest to copy, if drives failed because their labels differ.
 
-    The labels that the command named belong to the drives that did not fail because of them.
+    The labels of the command belong to the drives that did not fail because of labels.
     """
     odd = {drive for drive, reason in facts.failed.items() if "`labels." in reason}
     named = {key: value for key, value in facts.run["labels"].items() if value}

@@ -13,7 +13,7 @@ from roadeval.report.history import rates_table
 from roadeval.results.history import History, describe_change, verdict
 
 EVENTS: Final = 8
-"""Newest changes that are shown."""
+"""Greatest number of changes that are shown, the newest ones."""
 
 if TYPE_CHECKING:
     from rich.console import Console

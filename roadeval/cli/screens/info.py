@@ -19,10 +19,10 @@ NS = 1_000_000_000
 
 
 def show(log: LogDescription, out: Console) -> None:
-    """Print what a log holds, and what replay would pick of it."""
+    """Print what a log holds, and what replay would pick from it."""
     size = f"{log.bytes / 1e6:.1f} MB"
     is_partial = not log.verified and not log.by_summary
-    unverified = "; not read whole, --verify looks for all damage" if is_partial else ""
+    unverified = "; read in part, --verify looks for all damage" if is_partial else ""
     length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
     console.say(f"{log.path}: {length}, {size}{unverified}", out)
     if read := log.traffic:

@@ -9,6 +9,7 @@ from roadeval.cli.screens.tables import show_table
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import TESTED
 from roadeval.report.blocks import Table
+from roadeval.results.fleet import APART_NS, OF_A_DRIVE
 from roadeval.results.verdict import describe_errors
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: bool) -> None:
     """Print the worst frames with their rates.
 
-    The frames of a drive come with the parts of ERR and notes, the frames of a fleet with whether
-    the recording of their drive was kept.
+    A drive's frames have a column with their errors and notes; a fleet's frames have a column that
+    says whether the recording of their drive was kept.
     """
     first, is_scored = frames[0], frames[0].by == TESTED
     what, rule = "worst frames", "the worst of each scene"
@@ -29,7 +30,7 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
         what = "without truth, frames to look at"
         rule = "one per scene; ranked by uncertainty, not by error"
     elif of_fleet:
-        rule = "at most three per drive, three seconds apart"
+        rule = f"at most {OF_A_DRIVE} per drive, {APART_NS / 1e9:g} seconds apart"
     out.print(f"{name}: {what} of {first.variant} by {first.by} of {first.stage} ({rule})")
     out.print()
     columns = {"": [str(frame.rank) for frame in frames]}
@@ -59,7 +60,7 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
 
 
 def _why(frame: WorstFrame) -> str:
-    """Return which errors a frame has, and the notes on it; the title names its variant."""
+    """Return the errors of a frame and the notes on it, without its variant's name."""
     about = [note.removeprefix(f"{frame.variant} ") for note in frame.notes]
     clauses = [f"{describe_errors(frame.rates)}.", *about]
     return " ".join(clause[:1].upper() + clause[1:] for clause in clauses)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def show(outcome: Outcome, out: Console) -> None:
-    """Print what a replay read, each variant's rates, the outputs' paths, and what to type next."""
+    """Print what a replay read, each variant's rates, the outputs' paths, and the next commands."""
     facts = outcome.facts
     cameras = f"{counted(len(facts.cameras), 'camera')}, " if facts.cameras else ""
     out.print(f"{facts.drive.name}: {cameras}{account(facts.frames)}")
@@ -103,7 +103,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
 def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:
     """Yield the commands to type next, the most useful ones first.
 
-    The second one is what the result asks for: it brings labels, compares two masks, or adds the
+    The second command depends on the result: it brings labels, compares two masks, or adds the
     preset for real roads to a weak result.
     """
     facts, path = outcome.facts, quote(str(place))

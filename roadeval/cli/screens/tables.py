@@ -1,4 +1,4 @@
-"""Blocks of a report on a terminal; numbers are ASCII alone, whatever its encoding."""
+"""Blocks of a report on a terminal; numbers are ASCII, whatever the terminal's encoding."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 GAP: Final = 2
 """Spaces between columns."""
 LONGEST: Final = 20
-"""Letters of a name above which it may be folded, so that numbers are beside it."""
+"""Longer names, in letters, may be folded to leave room for numbers beside them."""
 
 
 def show(blocks: Iterable[Block], out: Console) -> None:
@@ -57,8 +57,8 @@ def show_verdict(facts: Facts | FleetFacts, out: Console) -> None:
 def show_table(table: Table, out: Console) -> None:
     """Print a table.
 
-    If the console has no room for it, headings of several words have a line for each. Columns of
-    numbers that do not fit even so are printed below, with the names again.
+    If the table is too wide for the console, each word of a heading has a line of its own. Columns
+    of numbers that still do not fit are printed below, with the names again.
     """
     from rich import box
     from rich.table import Table as Grid
@@ -93,7 +93,7 @@ def show_table(table: Table, out: Console) -> None:
 
 
 def ascii_of(number: str) -> str:
-    """Return a number as `roadeval.data.words` writes it, with a hyphen for minus and dash."""
+    """Return a number of `roadeval.data.words` with ASCII signs for minus, dash and about."""
     signs = f"{words.MINUS}{words.DASH}\N{ALMOST EQUAL TO}"
     return number.translate(str.maketrans(signs, "--~"))
 
@@ -101,9 +101,9 @@ def ascii_of(number: str) -> str:
 def _parts(
     table: Table, titles: Sequence[str], columns: Sequence[Sequence[str]], room: int
 ) -> Iterator[list[int]]:
-    """Divide the columns of numbers into parts that fit beside the names.
+    """Yield the positions of the columns of each part of a table that fits into ``room`` letters.
 
-    There are as few parts as possible, with about as many columns each, and at least one.
+    Each part has all columns of names. There are as few parts as possible, of about equal size.
     """
     from rich.cells import cell_len
 

@@ -1,4 +1,4 @@
-"""Which charts are made of which rows; in percent and percentage points.
+"""The charts of a result's rows, in percent and percentage points.
 
-To add a chart over the drive, add a file with a ``FIGURE`` (see `rates.OverDrive`).
+To add a chart over the drive, add a file with a ``FIGURE`` (see `standard.OverDrive`).
 """

@@ -44,15 +44,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OverDrive:
-    """A figure of a drive's report."""
+    """A figure with charts along the drive."""
 
     caption: str
     charts: Callable[[pd.DataFrame], Sequence[Chart]]
-    """The function that makes its charts of the rows of ``windows.csv``; it may make none."""
+    """The function that makes the charts from the rows of ``windows.csv``, or none."""
 
 
 def figures_over_drive() -> tuple[OverDrive, ...]:
-    """Return the paper's figures 3a and 3b, and the figures of this package's modules."""
+    """Return the paper's figures 3a and 3b, further rates, and the `FIGURE` of each module."""
     from roadeval.report import charts
 
     def further_rates(windows: pd.DataFrame) -> list[Chart]:
@@ -71,44 +71,45 @@ def figures_over_drive() -> tuple[OverDrive, ...]:
 def over_windows(
     windows: pd.DataFrame, rates: Sequence[str], by_variant: Mapping[str, Look] | None = None
 ) -> list[Chart]:
-    """Return a chart of each rate: each variant's final mask, window by window.
+    """Return a chart for each rate with a line for each variant's final mask, window by window.
 
-    ``rates`` are metrics or signs; to draw what is made of one, change its column before, and the
-    titles and units of the charts after.
+    ``rates`` are metrics or signs. To draw a quantity that is derived from one, change its column
+    before, and the titles and units of the charts after.
     """
     middles = (windows["first_frame"] + windows["last_frame"]) / 2
     return over_frames(windows.assign(frame=middles), rates, by_variant)
 
 
 def short_end(windows: pd.DataFrame, most: int = POINTS) -> tuple[int, float, float] | None:
-    """Return the frames of the last point, if they are fewer, and the numbers of both its ends.
+    """Return the number of frames of the last point and its ends; None if it has no fewer frames.
 
-    ``windows`` are drawn as at most so many points, each the mean of neighbours.
+    ``windows`` are drawn as at most ``most`` points, each the mean of neighbours. The ends are
+    frame numbers, half a frame outside.
     """
     spans = windows.groupby("window")[["first_frame", "last_frame", "frames"]].agg(
         {"first_frame": "min", "last_frame": "max", "frames": "max"}
     )
-    rows = -(-len(spans) // most)
-    last = spans.iloc[(len(spans) - 1) // rows * rows :]
-    if (frames := int(last["frames"].sum())) >= rows * spans["frames"].max():
+    per_point = -(-len(spans) // most)
+    last = spans.iloc[(len(spans) - 1) // per_point * per_point :]
+    if (frames := int(last["frames"].sum())) >= per_point * spans["frames"].max():
         return None
     return frames, last["first_frame"].min() - 0.5, last["last_frame"].max() + 0.5
 
 
 def describe_points(windows: pd.DataFrame, most: int = POINTS) -> str:
-    """Return how many frames a point of a chart over the drive stands for, as a clause."""
-    size, rows = windows["frames"].max(), -(-windows["window"].nunique() // most)
-    point = f"{rows} rows of {size} frames" if rows > 1 else f"{size} frames"
+    """Return a clause on how many frames a point of a chart of ``windows`` stands for."""
+    size, per_point = windows["frames"].max(), -(-windows["window"].nunique() // most)
+    point = f"{per_point} windows of {size} frames" if per_point > 1 else f"{size} frames"
     short = short_end(windows, most)
-    return f"each point is the mean of {point}{f', the last of {short[0]}' if short else ''}"
+    return f"each point is the mean of {point}{f', the last one of {short[0]}' if short else ''}"
 
 
 def over_frames(
     frames: pd.DataFrame, rates: Sequence[str], by_variant: Mapping[str, Look] | None = None
 ) -> list[Chart]:
-    """Return a chart of each rate: each variant's final mask, frame by frame.
+    """Return a chart for each rate with a line for each variant's final mask, frame by frame.
 
-    ``by_variant`` are the variants' looks.
+    ``by_variant`` has the variants' looks.
     """
     if not len(frames):
         return []
@@ -132,7 +133,7 @@ def over_frames(
 
 
 def ribbons(charts: Sequence[Chart]) -> list[Chart]:
-    """Return a low chart for each series of a chart along the drive, all with one axis."""
+    """Return a low chart for each series of charts along the drive; series of one share a scale."""
     return [
         replace(chart, title=series.name, series=[series], y_range=(0.0, max(most, 1.0)), low=True)
         for chart in charts
@@ -142,7 +143,7 @@ def ribbons(charts: Sequence[Chart]) -> list[Chart]:
 
 
 def stages(totals: Totals) -> list[Chart]:
-    """Return a chart of each rate with a line for each variant: the masks of its stages."""
+    """Return a chart for each rate with a line for each variant through its stages' masks."""
     names = merge_names(stages for variant, stages in totals.items() if variant != BASELINE)
 
     def line(variant: str, look: Look, rate: str) -> Series:
@@ -176,11 +177,10 @@ def regions(
     titles: Mapping[str, str],
     shown: Mapping[str, str] = _OF_REGIONS,
 ) -> list[Chart]:
-    """Return the error rate in each region, and its shares of the errors and of the pixels.
+    """Return charts of the error rate in each region, and of its shares of errors and pixels.
 
-    ``rates`` are those of `roadeval.evaluation.tables.by_region`, and ``shown`` has the columns to
-    draw with their titles. The charts show the ``variants`` and the regions of ``titles``, from top
-    to bottom.
+    ``rates`` come from `roadeval.evaluation.tables.by_region`, ``shown`` has the titles of the
+    columns to draw, and ``titles`` those of the regions, from top to bottom.
     """
     names, rates = rates.index.get_level_values("variant"), 100 * rates.droplevel("variant")
     percents = {variant: rates[names == variant].reindex([*titles]) for variant in variants}
@@ -200,13 +200,13 @@ def regions(
 
 
 def trimap(counts: Mapping[str, Mapping[str, Sequence[int]]]) -> Chart:
-    """Return ERR by width around the edge; ``counts`` are wrong and labelled pixels by variant."""
+    """Return a chart of ERR by width around the edge, from counts of wrong and labelled pixels."""
     lines = []
     for name, look in looks([*counts]).items():
         shares = [100 * wrong / (labelled or math.nan) for wrong, labelled in counts[name].values()]
         lines.append(series(name, look, range(len(shares)), shares))
     names = [*next(iter(counts.values()))]
-    return Chart("ERR within so many pixels of the edge", ChartKind.LINES, lines, names)
+    return Chart("ERR within N pixels of the edge", ChartKind.LINES, lines, names)
 
 
 def in_metres(name: str) -> str:
@@ -215,10 +215,7 @@ def in_metres(name: str) -> str:
 
 
 def by_distance(errors: Mapping[tuple[str, str], Interval], variants: Sequence[str]) -> Chart:
-    """Return the error rate by distance ahead; ``errors`` are intervals by band and variant.
-
-    Each variant has a row of its own in each band.
-    """
+    """Return a chart of the error rate by distance ahead, with a row for each band and variant."""
     bands = list(dict.fromkeys(band for band, _ in errors))
     by_variant, step = looks(variants), len(variants)
     return Chart(
@@ -236,22 +233,22 @@ def by_distance(errors: Mapping[tuple[str, str], Interval], variants: Sequence[s
 
 
 def series(name: str, look: Look, x: Any, y: Any) -> Series:
-    """Return a series of any numbers."""
+    """Return a series of numbers of any type."""
     return Series(name, look, [*map(float, x)], np.asarray(y, float).tolist())
 
 
 MEAN: Final = "mean over drives"
 DRAWN: Final = 40
-"""Greatest number of drives with a row; of more drives the worst and the best have one."""
+"""Greatest number of drives with a row; of more drives only the worst and the best are drawn."""
 Interval = tuple[float | None, float | None, float | None]
 """A mean and the ends of its interval, as fractions."""
 ends_of: Final = attrgetter("mean", "low", "high")
 
 
 def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference) -> Chart:
-    """Return the paired difference of ERR, frame by frame, and its mean with the interval.
+    """Return a chart of the paired difference of ERR, frame by frame, and its mean.
 
-    ``pairs`` are those of `roadeval.evaluation.tables.changes`.
+    ``pairs`` come from `roadeval.evaluation.tables.changes`; ``mean`` has the interval.
     """
     look = looks([treated, control])[treated]
     return Chart(
@@ -266,7 +263,7 @@ def difference(pairs: pd.DataFrame, treated: str, control: str, mean: Difference
 
 
 def changes(finals: Sequence[MaskChange]) -> list[Chart]:
-    """Return each result's change against the base, with a chart for each rate."""
+    """Return a chart for each rate of each mask's change against the base, with its interval."""
     return [
         Chart(
             f"Change of {rate}",
@@ -285,11 +282,11 @@ def changes(finals: Sequence[MaskChange]) -> list[Chart]:
 
 
 def forest(drives: pd.DataFrame, over: Difference, label: str) -> Figure:
-    """Return every drive's difference with its interval, the worst first, and the mean.
+    """Return a chart of each drive's difference with its interval, the worst first, and the mean.
 
     ``drives`` has a row a drive: its ``name`` and ``group``, and the ``mean``, ``low`` and ``high``
-    of its difference as fractions; lower is better. Of many drives only the worst and the best have
-    a row.
+    of its difference as fractions; lower is better. Of more than `DRAWN` drives only the worst and
+    the best are drawn.
     """
     ranked = drives.sort_values(["mean", "name"], ascending=[False, True])
     sentences = [caption("forest")]
@@ -323,7 +320,7 @@ def forest(drives: pd.DataFrame, over: Difference, label: str) -> Figure:
 def _intervals(
     name: str, look: Look, places: Sequence[int], means: Sequence[Interval] | Floats
 ) -> Series:
-    """Return means with the ends of their intervals, all as fractions, as a series."""
+    """Return a series in percent of means with the ends of their intervals, as fractions."""
     mean, low, high = (100 * np.array([*means], float).reshape(-1, 3)).T.tolist()
     return Series(name, look, [*places], mean, low, high)
 
@@ -339,9 +336,9 @@ BINS: Final = 16
 
 
 def reliability(levels: pd.DataFrame, totals: Totals) -> Chart:
-    """Return the share of road among pixels of equal stated probability, a line for each variant.
+    """Return a chart of the share of road by stated probability, with a line for each variant.
 
-    The arguments are those of `precision_over_recall`.
+    For the parameters see `precision_over_recall`.
     """
     by_variant = looks([*totals])
     lines = [series("as it says", Look(FAINT, "dotted"), [0, 100], [0, 100])]
@@ -357,7 +354,7 @@ def reliability(levels: pd.DataFrame, totals: Totals) -> Chart:
 
 
 def precision_over_recall(levels: pd.DataFrame, totals: Totals) -> Chart:
-    """Return a curve for each variant with probabilities of road, and a mark for each mask.
+    """Return a chart with a curve for each variant with probabilities, and a mark for each mask.
 
     ``levels`` are as in ``probabilities.csv``, ``totals`` as in ``summary.json``. Axes begin where
     the masks lie.

@@ -1,8 +1,8 @@
 """Blocks rendered as a page for a browser by Jinja.
 
 Jinja (BSD-3-Clause, with MarkupSafe 0.8 MB) escapes every value that a template prints, so that no
-text of a log can become markup; Typst's own HTML has neither pictures nor style. A page asks for
-nothing from anywhere: its content policy allows its own script, style and pictures alone.
+text of a log can become markup; Typst's own HTML has neither pictures nor style. A page loads
+nothing from anywhere: its content policy allows only its own script, style and pictures.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _hash(code: str) -> str:
 
 
 def variant_of(variants: Sequence[str], text: Cell | str) -> str:
-    """Return the variant that a text begins with, as "a", "a: its mask" or a difference from a."""
+    """Return the variant that a text begins with, such as "a: its mask"; empty without one."""
     words = text if isinstance(text, str) else text.text
     names = (v for v in variants if words == v or words.startswith((f"{v}: ", f"{v} {MINUS} ")))
     return next(names, "")
@@ -120,7 +120,7 @@ def source(image: ImageFile | bytes) -> str:
 
 
 def rows_of(table: Table) -> Iterator[tuple[list[tuple[Cell | str, bool]], str]]:
-    """Yield a table's rows: cells, with whether each repeats the cell above, and its classes.
+    """Yield each row of a table: pairs of a cell and whether it repeats the one above; CSS classes.
 
     An omitted word is the word of the row above, so a row keeps its meaning when the table is
     sorted.
@@ -160,7 +160,7 @@ class Section:
 
 
 def sections(blocks: Iterable[Block]) -> list[Section]:
-    """Return the sections of a document, without the grouping that paper needs.
+    """Return the sections of a document; blocks that paper keeps together are ungrouped.
 
     >>> [section.name for section in sections([Heading("The frames"), Heading("The frames")])]
     ['the-frames', 'the-frames-2']

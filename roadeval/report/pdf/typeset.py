@@ -2,8 +2,8 @@
 
 Typst is one wheel, Apache-2.0, that compiles offline in a few tens of milliseconds, breaks pages
 and tables well, and brings its fonts. ReportLab leaves the layout to the caller, WeasyPrint needs
-Pango and other system libraries, and no package of Python's index brings LaTeX. The document
-travels as JSON with its pictures as files beside it, so no text of a log can become markup, and
+Pango and other system libraries, and no package of Python's index brings LaTeX. Typst gets the
+document as JSON with pictures as files beside it, so no text of a log can become markup, and
 nothing is fetched from anywhere.
 """
 
@@ -51,7 +51,7 @@ def typeset(document: Report) -> bytes:
 def typeset_figure(
     svg: bytes, kind: Literal["pdf", "png"], pixels_per_inch: int | None = None
 ) -> bytes:
-    """Return a figure as a PDF of one page of its size, or as a PNG.
+    """Return a figure as a PNG, or as a PDF of one page that has the figure's size.
 
     A `ReportError` if the system's folder for temporary files cannot be written to.
     """
@@ -65,15 +65,15 @@ def _compile(
 ) -> bytes:
     """Compile files, one of them the main file, to a PDF or PNG.
 
-    Fonts are Typst's own and, for figures and charts, Matplotlib's DejaVu Sans; never the
-    machine's, so that a document looks the same everywhere. A letter that none of them has is an
-    empty box. Matplotlib's folder of fonts is not used as it is: it also has a font with a
-    placeholder for every letter, and Typst would set a whole text of a figure in that font if
-    DejaVu Sans lacks one letter of the text.
+    Fonts are Typst's own and, for figures and charts, Matplotlib's DejaVu Sans, but never the
+    machine's, so a document looks the same everywhere. A letter that no font has is an empty box.
+    Only DejaVu Sans is copied from Matplotlib's folder, because another font there has a
+    placeholder for every letter: Typst would set a whole text of a figure in that font if DejaVu
+    Sans lacks one letter of the text.
     """
     import typst
 
-    # Found without the import, which takes longer than a whole report.
+    # To import Matplotlib takes longer than to make a whole report.
     matplotlib = find_spec("matplotlib")
     assert matplotlib is not None
     assert matplotlib.origin is not None

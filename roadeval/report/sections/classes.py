@@ -1,4 +1,4 @@
-"""The classes of the truth: which of them the false road is, and which hide missed road."""
+"""The truth's classes that are taken for road, or beside which road is missed."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from roadeval.results.why import describe_classes
 MOST: Final = 8
 """Greatest number of classes in the charts."""
 LEAST: Final = 0.005
-"""Least share of the false road, or of the missed road, of a class in the charts."""
+"""A class in the charts has at least this share of the false road or of the missed road."""
 
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
-    """Yield the part of each class in the errors; nothing without classes."""
+    """Yield each class's shares of the errors; nothing without classes."""
     import pandas as pd
 
     rows, focus = findings.table("classes"), findings.facts.focus

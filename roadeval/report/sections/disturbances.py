@@ -1,4 +1,4 @@
-"""How the variants stand disturbances: a sentence, a chart, and tables of ERR."""
+"""ERR of the variants under disturbances: a sentence, a chart, and tables."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from roadeval.results.why import describe_disturbances
 
 
 def section(findings: Findings | FleetFolder) -> Iterator[Block]:
-    """Yield ERR under each disturbance; nothing if there was none."""
+    """Yield ERR under each disturbance; nothing without disturbances."""
     facts = findings.facts
     if not facts.disturbances:
         return
@@ -60,7 +60,7 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
 
 
 def errors_by_variant(facts: Facts | FleetFacts) -> dict[str, dict[str, float | None]]:
-    """Return each variant's ERR without a disturbance, ``none``, and by each one's text."""
+    """Return each variant's ERR by the text of each disturbance; ``none`` is without any."""
     columns: dict[str, dict[str, float | None]] = {}
     texts = [c.text for changes in facts.disturbances.values() for c in changes.values()]
     for name, changes in facts.disturbances.items():

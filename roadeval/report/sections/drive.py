@@ -91,7 +91,7 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
 
 
 def _over_time(findings: Findings) -> Iterator[Block]:
-    """Tabulate the flicker of each final mask, beside the truth's, and its error episodes."""
+    """Tabulate the flicker of each final mask and of the truth, and the error episodes."""
     measures = {
         name: measured | measured["episodes"]
         for name, measured in findings.facts.beyond.items()
@@ -117,7 +117,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
     table = Table(
         [
             *("final mask", "flicker, %", "the truth's, %", "beyond it", "pairs"),
-            *("n", "seconds", "longest", "share, %", "recovered", "median recovery"),
+            *("number", "seconds", "longest", "share, %", "recovered", "median recovery"),
         ],
         rows,
         groups=[("", 1), ("from frame to frame", 4), ("error episodes, seconds", 6)],
@@ -129,7 +129,7 @@ def _over_time(findings: Findings) -> Iterator[Block]:
 
 
 def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
-    """Yield the errors in each part of the image, of a drive or of many together."""
+    """Yield the errors in each region of the image, for a drive or for many together."""
     if findings.regions.empty:
         return
     yield Heading("Where the errors are")
@@ -162,7 +162,7 @@ def regions(findings: Findings | FleetFolder) -> Iterator[Block]:
 
 
 def stages(findings: Findings) -> Iterator[Block]:
-    """Yield the change of the mask by each stage, and each stage's part of the error."""
+    """Yield the rates of each stage's mask, and each stage's part of the error."""
     yield Heading("Which stage broke it")
     yield Figure(charts.stages(findings.facts.totals), caption("stages", baseline=BASELINE))
     columns = merge_names(findings.error_parts.values())
@@ -188,19 +188,19 @@ def stages(findings: Findings) -> Iterator[Block]:
 
 
 def _oracles(findings: Findings) -> Iterator[Block]:
-    """Yield the errors that remain if a stage is replaced by the truth, if the run counted them."""
+    """Yield the errors that remain if the truth replaces a stage; nothing if not counted."""
     rows = [*perfect_stages(findings.table("oracles"), findings.table("frames"))]
     if not rows:
         return
     table = Table(
         [
-            *("variant", "if there were a", "ERR as it is", "ERR then", "change, points"),
+            *("variant", "perfect stage", "ERR as it is", "ERR then", "change, points"),
             *(*(f"{name} then" for name in OTHERS), "frames"),
         ],
         [
             [
                 variant_cell(row["variant"], [*findings.facts.totals]),
-                f"perfect {row['oracle']}",
+                row["oracle"],
                 percent(row["as_is"]),
                 percent(row[TESTED]),
                 points(row[TESTED] - row["as_is"]),
@@ -226,7 +226,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
 
 
 def thresholds(findings: Findings) -> Iterator[Block]:
-    """Yield curves over thresholds and the numbers of them; nothing without a probability."""
+    """Yield curves over thresholds and their numbers; nothing without probabilities."""
     curves, levels = findings.facts.curves, findings.table("probabilities")
     if not curves or not len(levels):
         return

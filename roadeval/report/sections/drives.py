@@ -1,4 +1,4 @@
-"""The sections of many drives: differences, parts by tag, worst frames, missing ones."""
+"""The sections of many drives: differences, tags, worst frames, and missing drives."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart, ChartKind, Series, looks, thin
 from roadeval.report.charts.standard import forest
 from roadeval.report.tables import breaks_of
-from roadeval.results.fleet import FleetFolder, results_path
+from roadeval.results.fleet import APART_NS, OF_A_DRIVE, FleetFolder, results_path
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, UNSCORED
 from roadeval.results.sentences import MARK, marked_interval
@@ -51,7 +51,7 @@ _SHOWN: Final = (TESTED, "FPR", "FNR")
 
 
 def plots(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the effects of the filter and of the best variant on each drive; the worst drives."""
+    """Yield the effects of the filter and the best variant on each drive, and the worst drives."""
     if findings.focus_scores.empty:
         return
     yield Heading("Drive by drive")
@@ -96,8 +96,8 @@ PAGE: Final = "report.html"
 def along(findings: FleetFolder, most: int, beside: Path) -> Iterator[Block]:
     """Yield the error rate of the focus along each drive, the worst drive first.
 
-    The first drives have pictures of their worst frames, ``most`` in all. A drive's page is linked
-    from a page in the folder ``beside``.
+    The first drives have pictures of their worst frames, at most ``most`` in all. Links to the
+    pages of drives are relative to the folder ``beside``.
     """
     focus, scores = findings.facts.focus, findings.focus_scores
     if focus is None or scores.empty:
@@ -139,7 +139,7 @@ def along(findings: FleetFolder, most: int, beside: Path) -> Iterator[Block]:
 def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     """Tabulate every drive with its state, its rates and its tags.
 
-    A table of so many ``worst`` drives, with the highest ERR, has no state and no group.
+    With ``worst`` it has that many drives with the highest ERR, and neither state nor group.
     """
     scores, rows = findings.focus_scores, findings.drives
     tags = {}
@@ -178,7 +178,7 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
 
 
 def missing(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the drives that failed by reason, those without truth, and those with losses.
+    """Yield the drives that failed, have no truth or lost a part, each by their reasons.
 
     The most frequent reason is the first.
     """
@@ -223,7 +223,7 @@ def by_reason(findings: FleetFolder, rows: pd.DataFrame) -> dict[str, list[str]]
 
 
 def strata(findings: FleetFolder) -> Iterator[Block]:
-    """Yield a table of parts by tag for each difference that has a plot."""
+    """Yield, for each difference that has a plot, its mean for each value of each tag."""
     if findings.facts.strata:
         yield Heading("By tag")
     for effect, title in main_effects(findings):
@@ -259,7 +259,7 @@ LONGEST: Final = 20
 
 
 def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iterator[Block]:
-    """Yield the worst frames: at most so many, with so many pictures beside each other."""
+    """Yield at most ``most`` worst frames, with ``across`` pictures beside each other."""
     rows = records(findings.worst[:most])
     if not rows:
         return
@@ -275,7 +275,8 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
         yield ImageGrid(pictures[:SEEN], across)
     if more := pictures[SEEN:]:
         yield Details(f"{len(more)} more", [ImageGrid(more, across)])
-    legend = caption("worst frames of drives", variant=focus, errors=caption("errors"))
+    limits = {"most": OF_A_DRIVE, "seconds": APART_NS / 1e9}
+    legend = caption("worst frames of drives", variant=focus, errors=caption("errors"), **limits)
     if lacking := len(rows) - len(pictures):
         legend += f" {caption('missing pictures', pictures=counted(lacking, 'picture'))}"
     yield Text(legend, "note")

@@ -1,4 +1,4 @@
-"""Frames to look at: the worst and the most changed ones in a report, all on a page."""
+"""Frames to look at: a report has the worst and the most changed frames, a page all."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
 LEAST: Final = 4
 MOST: Final = 6
-"""Least and greatest number of pictures of outcomes beside each other."""
+"""Least and greatest number of pictures of outcomes in a row."""
 
 
 def worst_frames(findings: Findings) -> Iterator[Block]:
@@ -69,7 +69,7 @@ def worst_frames(findings: Findings) -> Iterator[Block]:
 def _frames(
     findings: Findings, head: Sequence[Block], frames: Sequence[NotableFrame]
 ) -> Iterator[Block]:
-    """Yield frames below a heading, which is on the page of the first frame."""
+    """Yield frames below a heading; no page break separates it from the first frame."""
     for place, frame in enumerate(frames):
         yield KeepTogether([*(head if place == 0 else ()), *notable_frame(findings, frame)])
 
@@ -130,29 +130,29 @@ LARGE_ON_PAGE: Final = 520
 SMALL_ON_PAGE: Final = 300
 """Pixels across the pictures of outcomes and of layers."""
 ROWS: Final = 2000
-"""Greatest number of frames in the table; the table of a longer drive has those with the highest
+"""Greatest number of frames in the table; of a longer drive it has the frames with the highest
 ERR."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThresholdSlider:
-    """A threshold on how probable road is, which a page can move."""
+    """A threshold on the probability of road, which a page can move."""
 
     variant: str
     stage: str
     now: float
     """The threshold of the run, from 0 to 1."""
     line: str
-    """The lines of a configuration that set it to ``{}``."""
+    """The lines of a configuration that set the threshold to ``{}``."""
     counts: Sequence[int]
     """TP, TN, FP and FN of the stage's masks in the run."""
     levels: Sums
     """``(2, 256)``: labelled pixels of the drive by level, non-road and road."""
     reached: bool = False
-    """Whether road reaches the threshold, as in masks from elsewhere; else road exceeds it."""
+    """Whether a pixel at the threshold is road, as in masks from elsewhere."""
 
     def as_json(self) -> dict[str, Any]:
-        """Return all that the script needs."""
+        """Return what the script of a page needs."""
         other, road = self.levels.tolist()
         words = {n: getattr(self, n) for n in ("stage", "now", "line", "reached")}
         return {**words, "counts": [*self.counts], "other": other, "road": road}
@@ -165,7 +165,7 @@ class FrameBrowser(Block):
     rows: Sequence[NotableFrame]
     """The frames of the drive, in order."""
     variants: Sequence[str]
-    """The variants that were scored, or without truth those with signs of doubt."""
+    """The variants with rates, or without truth with signs of doubt."""
     charts: Sequence[Chart]
     """Rates along the drive."""
     command: str = ""
@@ -230,13 +230,13 @@ class FrameBrowser(Block):
 
     @property
     def conditions(self) -> dict[str, int]:
-        """The conditions of frames in words, each with a number."""
+        """The numbers 0, 1, ... of the conditions of frames, by their words."""
         words = dict.fromkeys(words for row in self.shown for words in row.conditions)
         return {condition: place for place, condition in enumerate(words)}
 
     @property
     def first(self) -> int | None:
-        """The frame that is shown at first: the worst one with pictures; None without any."""
+        """The frame that is shown first: the worst one with pictures; None without pictures."""
         pictured = [row for row in self.rows if row.frame in self.pictured]
         return max(pictured, key=lambda row: row.error).frame if pictured else None
 
@@ -275,7 +275,7 @@ def strip(
         pictures, variant = [], images[0].title.partition(":")[0] if images else ""
         for place, image in enumerate(images):
             name = f"{variant}: {image.title}" if place else image.title
-            # Without truth people look at the last mask.
+            # Without truth the last mask is the picture to look at.
             is_large = not frame.rates and image is images[-1]
             pictures.append(_picture(image, name, LARGE_ON_PAGE if is_large else layers))
         rows.append(pictures)

@@ -20,15 +20,15 @@ from roadeval.results.facts import Facts
 METRES: Final = "metres: "
 """The beginning of the sentence on the source of the camera."""
 UNSURE: Final = "\N{ALMOST EQUAL TO}"
-"""The mark before a number that a wrong camera could explain."""
+"""The mark before a number that a small error of the camera's pose could explain."""
 KITTI: Final = (("MaxF", "F1"), ("AP11", ""), ("precision",) * 2, ("recall",) * 2)
-"""Measures of KITTI's benchmark, each with its counterpart for a mask without probabilities."""
+"""KITTI's measures, each with the one that replaces it for a mask without probabilities."""
 Measure = Mapping[Any, Any]
 """A row of ``metres``."""
 
 
 def on_the_ground(findings: Findings) -> Iterator[Block]:
-    """Yield KITTI's rates, errors by distance, and the road's edges and end, if they are known."""
+    """Yield KITTI's rates; for a known camera also errors by distance, and the road's ends."""
     if findings.facts.kitti:
         yield Heading("KITTI's road benchmark")
         yield kitti_table(findings.facts)
@@ -43,8 +43,8 @@ def on_the_ground(findings: Findings) -> Iterator[Block]:
     yield from edges_tables(rows, names)
     (source,) = (topic for topic in findings.facts.drive.topics if topic.startswith(METRES))
     flat = caption("camera", camera=source.removeprefix(METRES))
-    sway = caption("posed camera" if _is_posed(rows) else "homography", unfiltered=UNFILTERED)
-    yield Text(f"{flat} {sway}", "note")
+    effect = caption("posed camera" if _is_posed(rows) else "homography", unfiltered=UNFILTERED)
+    yield Text(f"{flat} {effect}", "note")
 
 
 def kitti_table(facts: Facts) -> Table:
@@ -64,9 +64,9 @@ def kitti_table(facts: Facts) -> Table:
 
 
 def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool = False) -> Table:
-    """Tabulate ERR by distance and by area of ground, and the measures of KITTI's benchmark there.
+    """Tabulate ERR by distance and by area of ground, and KITTI's measures over the ground.
 
-    Below the row of a variant is the range for other stances of the camera, if that is known. A
+    The row below a variant has the range of ERR for other poses of the camera, if it is known. A
     ``brief`` table has ERR alone.
     """
     places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == TESTED))
@@ -82,7 +82,7 @@ def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool
         bases = [measures[first, TESTED, place] for place in places]
         marks = [
             UNSURE
-            if variant != first and posed and _sway(row) > abs(row["value"] - base["value"])
+            if variant != first and posed and _pose_effect(row) > abs(row["value"] - base["value"])
             else ""
             for row, base in zip(errors, bases, strict=True)
         ]
@@ -94,7 +94,7 @@ def distance_table(rows: Sequence[Measure], names: Sequence[str], *, brief: bool
         lines.append([variant_cell(variant, names), *cells])
         if defined(errors[0]["low"]):
             ranges = [f"{percent(r['low'], 1)}{DASH}{percent(r['high'], 1)}" for r in errors]
-            lines.append(["as the camera stands", *ranges, *[""] * (0 if brief else len(KITTI))])
+            lines.append(["range over poses", *ranges, *[""] * (0 if brief else len(KITTI))])
     heads = [charts.in_metres(place) for place in places if place != ABOVE]
     sentences = [caption("distances")]
     if not brief:
@@ -116,15 +116,15 @@ def _is_posed(rows: Sequence[Measure]) -> bool:
     return any(defined(row["low"]) for row in rows)
 
 
-def _sway(row: Measure) -> float:
-    """Return the change of a number by a wrong camera; infinite if that may take it away."""
+def _pose_effect(row: Measure) -> float:
+    """Return how much a wrong pose can change a number; infinite if there may be no number."""
     if not defined(row["low"]):
         return math.inf
     return float(max(row["high"] - row["value"], row["value"] - row["low"]))
 
 
 def edges_tables(rows: Sequence[Measure], names: Sequence[str]) -> Iterator[Table]:
-    """Tabulate the distances of the road's edges, and of its end, from the truth's."""
+    """Tabulate how far the edges and the end of the road in masks are from the truth's, in m."""
     measures = {(row["variant"], row["measure"], row["where"]): row for row in rows}
     places = list(dict.fromkeys(row["where"] for row in rows if row["measure"] == LEFT))
     variants = [name for name in names if name != BASELINE and (name, FREE, "ahead") in measures]
@@ -138,7 +138,7 @@ def edges_tables(rows: Sequence[Measure], names: Sequence[str]) -> Iterator[Tabl
                 cells = (cell for row in sides for cell in _end(row, posed=posed))
                 lines.append([head, charts.in_metres(place), *cells])
                 head = ""
-    columns = ("median", "as it stands", "95 %", "missing")
+    columns = ("median", "range", "95 %", "missing")
     if lines:
         yield Table(
             ["edges, m", "ahead", *columns, *columns],
@@ -159,10 +159,10 @@ def edges_tables(rows: Sequence[Measure], names: Sequence[str]) -> Iterator[Tabl
 
 
 def _end(row: Measure, *, posed: bool) -> tuple[str, str, str, str]:
-    """Return the cells of an end of the road: median, range, 95th percentile, missing frames."""
+    """Return the cells of an edge or end: median, range, 95th percentile, missing frames."""
     if not row["frames"]:
         return (DASH,) * 4
-    unsure = posed and defined(row["value"]) and _sway(row) > abs(row["value"])
+    unsure = posed and defined(row["value"]) and _pose_effect(row) > abs(row["value"])
     ends = (_metres(row[end]) for end in ("low", "high"))
     span = " to ".join(ends) if defined(row["low"]) else DASH
     median, size = f"{UNSURE * unsure}{_metres(row['value'])}", _metres(row["p95"]).lstrip("+")

@@ -1,4 +1,4 @@
-"""The sources of the results, and the command that makes them again; run.toml has the settings."""
+"""The sources of the results, and the command that makes them again."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ def section(findings: Findings) -> Iterator[Block]:
 
 
 def of_drives(findings: FleetFolder) -> Iterator[Block]:
-    """Yield the version that has replayed many drives, and the files with its settings."""
+    """Yield the version that replayed many drives, and the files with the settings."""
     yield Heading("What was run")
     yield Text(caption("run of a fleet", version=findings.facts.version, folder=findings.path))
 
 
 def _methods(facts: Facts) -> Iterator[Block]:
-    """Yield the description that a stage, as a network, gives of itself, with its time."""
+    """Yield the descriptions that stages, such as networks, give of themselves, and their times."""
     for variant, stages in facts.methods.items():
         for stage, description in stages.items():
             rows = dict(flatten(description))

@@ -1,4 +1,4 @@
-"""Several cameras of one drive: a table of all, and the worst frame of each."""
+"""The sections of a drive with several cameras: a table of all, and each camera's worst frame."""
 
 from __future__ import annotations
 

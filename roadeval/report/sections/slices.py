@@ -1,4 +1,4 @@
-"""When a mask fails: the conditions under which it errs more, found and then confirmed."""
+"""When a mask fails: confirmed conditions under which it errs more."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from roadeval.results.why import describe_place, describe_slice
 
 
 def when_it_fails(findings: Findings | FleetFolder, level: int = 1) -> Iterator[Block]:
-    """Yield the slices of the focus, or that none holds; nothing if no search was made.
+    """Yield the conditions under which the focus fails, or a sentence that none is confirmed.
 
-    The heading is of a ``level``; only a page of one camera has the frames that are linked.
+    Yield nothing without a search. Frames are links only below a heading of ``level`` 1.
     """
     facts, of_fleet = findings.facts, isinstance(findings, FleetFolder)
     slices = facts.slices.get(facts.focus or "")

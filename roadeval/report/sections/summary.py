@@ -1,4 +1,4 @@
-"""The first page: the verdict, the table of rates, a few frames or differences, and warnings."""
+"""The first page: the verdict, rates, a few frames or differences, and warnings."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
 def why(facts: Facts | FleetFacts, variant: str | None = None) -> Iterator[BulletList]:
     """Yield the reasons for the errors of a variant, by default the focus, if there are any.
 
-    Those of other variants are for a page on which they may become the focus.
+    Paper shows only the reasons of the focus; a page shows the reasons of the chosen focus.
     """
     name = variant or facts.focus or ""
     if reasons := facts.why.get(name):

@@ -45,7 +45,7 @@ from roadeval.report.sections.slices import when_it_fails
 from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import differences_table, rates_table, stages_table
 from roadeval.results.facts import Facts, FrameAccount, TrainingFacts
-from roadeval.results.fleet import FleetFolder
+from roadeval.results.fleet import APART_NS, OF_A_DRIVE, FleetFolder
 from roadeval.results.schema import FAILED, SCORED
 from roadeval.results.tables import read_table
 from tests.evaluation.making import a_table
@@ -204,7 +204,8 @@ def test_undefined_rates_are_never_the_best_and_told_and_how_often():
     undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
     totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
     assert list(warnings(some_findings(totals=totals))) == [
-        "filtered: of 1,200 frames, undefined and left out: FNR on 1,200 and FPR on 3."
+        "filtered: means leave out the frames on which a rate is undefined "
+        "(FNR on 1,200 and FPR on 3 of 1,200 frames)."
     ]
 
 
@@ -314,7 +315,7 @@ def test_figures_are_the_paper_s_if_its_pipeline_ran_and_a_short_last_point_is_s
     _, details = over_drive(some_findings(claims=claims, table=tables.get))
     assert details.title.startswith(title)
     first, *others = (block for block in details.blocks if isinstance(block, Figure))
-    assert "each point is the mean of 10 frames, the last of 4." in first.caption
+    assert "each point is the mean of 10 frames, the last one of 4." in first.caption
     assert not any("point" in figure.caption for figure in others)
 
 
@@ -361,7 +362,7 @@ def test_a_slice_is_a_sentence_a_row_and_links_to_its_worst_frames():
 
 @pytest.mark.parametrize(
     ("frames", "slices", "begin"),
-    [(90, {"filtered": []}, "Nothing is confirmed."), (39, {}, "Too little")],
+    [(90, {"filtered": []}, "No condition is confirmed."), (39, {}, "Too little")],
 )
 def test_where_no_slice_holds_a_sentence_says_so(frames, slices, begin):
     heading, sentence = blocks(frames, **slices)
@@ -451,6 +452,8 @@ def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, fleet
     told = opened_blocks(drives.worst, (FleetFolder(copy)))
     assert len(told[1].pictures) == 11
     assert "Not in the folder: 1 picture." in told[2].text
+    limits = f"at most {OF_A_DRIVE} frames of a drive, at least {APART_NS // 10**9} seconds apart"
+    assert limits in told[2].text
 
 
 def test_a_report_lands_in_the_fleets_folder_and_is_the_same_each_time(folder):
