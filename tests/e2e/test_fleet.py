@@ -138,6 +138,17 @@ def test_the_same_command_again_tries_what_failed_or_has_gone_alone(gone, drives
     assert tables(folder) == before
 
 
+def test_the_drives_have_packed_tables_without_those_that_were_left_out(two, tmp_path):
+    logs, config = two
+    config = config.override({"output": {"without": ["heat"], "packed": False}})
+    roadeval.replay_fleet(logs, tmp_path / "f", config, executor=Here())
+    for folder in filter(Path.is_dir, (tmp_path / "f" / "results").iterdir()):
+        endings = {path.name.split(".", 1)[1] for path in folder.iterdir()}
+        assert endings == {"csv.gz", "json", "toml"}
+        assert (folder / "regions.csv.gz").exists()
+        assert not (folder / "heat.csv.gz").exists()
+
+
 def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
     folder = tmp_path / "logs"
     for number, name in enumerate("xyz"):

@@ -318,6 +318,7 @@ def of(path, **values):
         {"variants": {"wide": {"preset": "paper"}}},
         {"train_frames": 5},
         {"truth": "/truth/road"},
+        {"output": {"without": ["heat"]}},
     ],
 )
 def test_two_configurations_of_one_drive_differ(values, a_log):
@@ -337,7 +338,7 @@ def test_other_frames_under_the_same_name_and_another_version_differ_and_other_p
     a_log, tmp_path, monkeypatch
 ):
     before, copy = of(a_log), shutil.copy(a_log, tmp_path / "drive.mcap")
-    places = {"output": {"save": "x.rrd", "reports": "y", "mcap": "z.mcap"}}
+    places = {"output": {"save": "x.rrd", "reports": "y", "mcap": "z.mcap", "packed": True}}
     assert of(copy, jobs=3, **places) == before
     assert of(write_log(copy, broken=3)) != before
     monkeypatch.setattr(prepared, "VERSION", "99.0")

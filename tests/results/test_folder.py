@@ -175,6 +175,7 @@ def test_packed_results_are_the_same_results(tmp_path: Path) -> None:
         content = (tmp_path / "packed" / f"{table}.csv.gz").read_bytes()
         assert gzip.decompress(content) == (tmp_path / "plain" / f"{table}.csv").read_bytes()
         assert content == (tmp_path / "again" / f"{table}.csv.gz").read_bytes()
+        assert content[4:8] == bytes(4)  # the time of writing
         pd.testing.assert_frame_equal(packed.table(table), plain.table(table))
     assert not list((tmp_path / "packed").glob("*.csv"))
     texts = [(tmp_path / name / "summary.json").read_text() for name in ("packed", "plain")]
