@@ -517,8 +517,7 @@ class Recorder:
                 break
         if not answer.done() or answer.exception():
             atexit.unregister(rr.rerun_shutdown)
-            # Freeing the stream would wait for its writer, so a thread keeps it to the end.
-            in_thread(partial(lambda _stream: Event().wait(), self._stream))
+            in_thread(partial(_keep, self._stream))
             self._failed, self._stream = True, None
             raise self._incomplete()
 
@@ -562,6 +561,11 @@ class Recorder:
         error = RecordingError(problem, where=self.path)
         error.__cause__ = refusal
         return error
+
+
+def _keep(_stream: object) -> None:
+    """Keep a stream as long as the process lives: freeing it would wait for its writer."""
+    Event().wait()
 
 
 def _failure(number: int) -> OSError:

@@ -95,6 +95,7 @@ def read_table(
             lines = file.readlines() if stated is None else []
             if len({*lines}) < len(lines):
                 raise ValueError("a row is there twice")
+            # It was read to its end: if that is its beginning, there is not even a header.
             content = file if file.tell() else BytesIO(table.header.encode())
             parsed = _parse_csv(content, table)
             # Each column leaves Arrow's memory as it enters pandas's. Of one chunk it would be a

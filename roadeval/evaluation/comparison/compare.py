@@ -282,7 +282,9 @@ def _compare_two(
         frames["new"] += _count_frames(new_rows)
         levels.append(by_drive(new_rows.assign(final=tables.is_final(new_rows)), MASK, groups))
         new_keys = {base_keys[key]: key for key in batch if key in base_keys}
-        base_rows = base.table("frames", new_keys) if new_keys else new_rows.iloc[:0]
+        if not new_keys:
+            continue
+        base_rows = base.table("frames", new_keys)
         frames["base"] += _count_frames(base_rows)
         pairs = pairing.common_masks(base_rows, new_rows)
         common = {*tables.keys_of(pairs)[0]}
@@ -309,7 +311,9 @@ def _compare_two(
             "nothing can be compared; replay the same range into both"
         )
     one_camera = len(matched) == 1  # then a number names a frame
-    disagreed = new.table("disagreements", [*base_keys]) if one_camera and across_variants else None
+    disagreed: Iterator[pairing.Disagreement] = iter(())
+    if one_camera and across_variants:
+        disagreed = pairing.disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
     of_masks, of_regions = (None, None) if several else (pairs, parts)
     changed = changed_settings(matched)
     old_classes = base.table("classes", {old: key for key, old in base_keys.items()})
@@ -325,9 +329,7 @@ def _compare_two(
         drives=tuple(_rank_drives(drives)),
         regions=tuple(_region_changes(new.label, pd.concat(regions), of_regions, settings)),
         moved=tuple(pairing.moved_frames(new.label, pairs)) if one_camera else (),
-        disagreements=tuple(
-            () if disagreed is None else pairing.disagreements(disagreed, pairs, *labels)
-        ),
+        disagreements=tuple(disagreed),
         warnings=tuple(_warnings(labels, without_frames, frames, changed)),
         settings=settings,
         classes=tuple(_class_changes(new.label, old_classes, new_classes)),
