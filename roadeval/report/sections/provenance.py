@@ -18,10 +18,9 @@ def section(findings: Findings) -> Iterator[Block]:
     facts = findings.facts
     yield Heading("How to reproduce this")
     if facts.log:
-        yield Text(f"Log: {facts.log.path}")
-        yield Text(f"Digest of its index and checksums: {facts.log.digest}")
-        if findings.again:
-            yield KeepTogether([Command(findings.again), note("reproduced")])
+        digest = Text(f"Digest of its index and checksums: {facts.log.digest}")
+        again = [Command(findings.again), note("reproduced")] if findings.again else []
+        yield KeepTogether([Text(f"Log: {facts.log.path}"), digest, *again])
     for name, labels in facts.masks.items():
         yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
     yield from _methods(facts)
