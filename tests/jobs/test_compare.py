@@ -12,6 +12,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError, compare, replay, replay_fleet
+from roadeval.evaluation import tables
 from roadeval.jobs.results.compare import as_json
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, PIXELS, settings, write_log, write_module
@@ -165,6 +166,16 @@ def test_a_recording_and_the_folder_beside_it_hold_the_same(made):
             getattr(roadeval.Result(path), table) for path in (made.alone, made.recording)
         )
         pd.testing.assert_frame_equal(one, other)
+
+
+@pytest.mark.parametrize("table", ["frames", "regions"])
+@pytest.mark.parametrize("kind", ["alone", "recording", "many"])
+def test_the_rows_of_final_masks_are_those_of_the_whole_table(made, kind, table):
+    result = roadeval.Result(getattr(made, kind))
+    expected = tables.finals(result.table(table)).reset_index(drop=True)
+    assert {*expected["stage"]} == {"post"}
+    rows = result.table(table, final=True).reset_index(drop=True)
+    pd.testing.assert_frame_equal(rows, expected, check_categorical=False)
 
 
 def test_several_results_are_one_table_with_their_drives(made):

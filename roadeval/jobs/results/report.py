@@ -11,7 +11,6 @@ from typing import Final, Literal
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.tables import finals
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import FramePicker, evenly
@@ -209,7 +208,7 @@ def _frames_of_figure_2(result: DriveResult) -> Sequence[int]:
 
 def collect(result: DriveResult) -> Findings:
     """Collect everything that the report of a drive shows."""
-    regions = finals(result.table("regions"))  # read first: it takes more memory than all else
+    regions = result.table("regions", final=True)  # read first: it takes more memory than all else
     pictured, picker = _pictured(result), FramePicker(result)
     worst = picker.worst()
     return Findings(
