@@ -8,9 +8,10 @@
 # `bitwise_or` and `bitwise_xor`, and the results are right and of type bool. `bitwise_not` returns
 # an array of type bool, too, but turns the bits of the bytes: 1 becomes 254, 0 becomes 255. Both are
 # True. A mask with half of the pixels has an inverse with all of them by `sum`, `mean`,
-# `countNonZero` and as `mask=` of `cv2.mean`. By NumPy half of the frame is road and no road at once. A rate over all that is not road is then a rate over the whole frame.
-# Nothing is raised. Programs that mix masks by OpenCV alone do not notice: the bitwise functions
-# still see 254 and 1 as having no bit in common.
+# `countNonZero` and as `mask=` of `cv2.mean`. By NumPy, half of the frame is road and no road at
+# once. A rate over all that is not road is then a rate over the whole frame. Nothing is raised.
+# Programs that mix masks by OpenCV alone do not notice: its bitwise functions see that 254 and 1
+# have no bit in common.
 #
 # `~mask`, or `cv2.bitwise_xor` with an array of True, is right.
 #

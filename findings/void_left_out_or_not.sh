@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# scikit-learn's `labels=[0, 1]` leaves void pixels out of one score, and counts them as errors in another.
+# scikit-learn's `labels=[0, 1]` leaves void pixels out of one score and counts them in another.
 #
 # Software: scikit-learn 1.9.1, with numpy 2.4.6.
 #
