@@ -26,12 +26,14 @@ cd "$folder"
 import contextlib
 import io
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 from label_studio_sdk.converter import Converter
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+print(", ".join(f"{name} {version(name)}" for name in ("label-studio-sdk", "pycocotools")))
 CONFIG = (
     '<View><Image name="image" value="$image"/><PolygonLabels name="tag" toName="image">'
     '<Label value="road"/></PolygonLabels></View>'

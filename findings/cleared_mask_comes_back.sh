@@ -27,6 +27,7 @@ import numpy as np
 import rerun as rr
 import rerun.server
 
+print("rerun", rr.__version__)
 ROAD = np.ones((1, 2), np.uint8)
 
 stream = rr.RecordingStream("demo", recording_id="drive")

@@ -37,6 +37,8 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.compute as pc
 
+for package in (np, pd, pa, pl, duckdb):
+    print(package.__name__, package.__version__)
 scores = np.repeat(np.arange(100) / 100, 10).astype(np.float32)
 table = pa.table({"score": scores})
 by_numpy = table.to_pandas()

@@ -29,6 +29,7 @@ cd "$folder"
 import contextlib
 import io
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 from datumaro.components.dataset import Dataset
@@ -36,6 +37,7 @@ from PIL import Image
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+print(", ".join(f"{name} {version(name)}" for name in ("datumaro", "pycocotools")))
 POLYGON = '<polygon label="road" occluded="0" points="0,20;80,20;80,50;0,50" z_order="0"/>'
 PAINTED = (
     '<mask label="road" occluded="0" rle="0, 2400" left="0" top="20" width="80" height="30" '
