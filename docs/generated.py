@@ -208,6 +208,21 @@ def _name(name: str) -> tuple[str, str]:
     return _code(name), first
 
 
+# --- Findings -------------------------------------------------------------------------------------
+
+
+def findings() -> str:
+    """Return the first sentence of each finding, and the software that it is about."""
+    rows = []
+    for path in sorted((ROOT / "findings").glob("*.sh")):
+        header, _, _ = path.read_text(encoding="utf-8").partition("\nset -")
+        comment = header.replace("#!/usr/bin/env bash\n", "").replace("#", "")
+        first, software, *_ = (" ".join(part.split()) for part in comment.split("\n\n"))
+        link = f"[{path.stem}](../../findings/{path.name})"
+        rows.append((first, software.removeprefix("Software: "), link))
+    return _table(("what it does", "software", "shown by"), rows)
+
+
 def _table(head: tuple[str, ...], rows: Any) -> str:
     lines = [head, ("---",) * len(head), *rows]
     return "\n".join(f"| {' | '.join(map(_cell, line))} |" for line in lines)
@@ -221,6 +236,7 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "tables_of_a_fleet": tables_of_a_fleet,
     "rates": rates,
     "python": python,
+    "findings": findings,
 }
 """What stands between marks, by the name in the first of them."""
 

@@ -70,15 +70,15 @@ def write_report(
     path = Path(output or beside.with_name(f"{beside.name}.pdf"))
     if not (output or usual) and leads_outside(path, source):  # it may come from someone else
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
-    findings = findings_of(opened)
-    if audit is not None:
-        if opened.drive is None or not isinstance(findings, Findings):
-            raise RoadevalError("an audit is of one camera of a drive", where=audit)
-        from roadeval.jobs.results.audit import read_doubts
-
-        doubts = read_doubts(audit, opened.drive)
-        findings = replace(findings, facts=with_doubts(findings.facts, doubts))
     with holding(path, inputs=[source]):
+        findings = findings_of(opened)
+        if audit is not None:
+            if opened.drive is None or not isinstance(findings, Findings):
+                raise RoadevalError("an audit is of one camera of a drive", where=audit)
+            from roadeval.jobs.results.audit import read_doubts
+
+            doubts = read_doubts(audit, opened.drive)
+            findings = replace(findings, facts=with_doubts(findings.facts, doubts))
         if path.suffix.lower() not in PAGES:
             return write_file(path, typeset(document(findings)))
         return write_file(path, page(_page_of(opened, findings, on_progress, path.parent)))
