@@ -76,13 +76,9 @@ class RoadevalError(Exception):
         return str(self.sentence)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remake, (type(self), self.args), self.__dict__
+        # A constructor may take other arguments, so none is called.
+        return type(self).__new__, (type(self), *self.args), self.__dict__
 
 
 class SettingError(RoadevalError, ValueError):
     """Settings of one table that cannot be used; the message names them without their table."""
-
-
-def _remake(kind: type[RoadevalError], arguments: tuple[Any, ...]) -> RoadevalError:
-    """Make an error without its constructor, which may take other arguments."""
-    return kind.__new__(kind, *arguments)
