@@ -37,6 +37,7 @@ from roadeval.runtime.text import elide, visible, visible_lines
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; it is written last."""
+ADAPTER_OF: Final = cache(TypeAdapter)
 FETCHED: Final[dict[Path, str]] = {}
 """Public URLs of results that were fetched, by their paths."""
 
@@ -255,7 +256,7 @@ class FactsFile:
             raise cls._damage(where, error) from error
         check_format(content, cls.FORMAT, where)
         try:
-            facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
+            facts: Self = ADAPTER_OF(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
         except ValidationError as error:
             wrong = [e["loc"][0] for e in error.errors(include_url=False, include_input=False)]
             part = next((name for name in wrong if name in content), wrong[0])
@@ -503,11 +504,6 @@ class FleetFacts(FactsFile):
 def is_fleet(path: str | Path) -> bool:
     """Return whether a path leads to a fleet's folder."""
     return (Path(path) / FLEET).is_file()
-
-
-@cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
 
 
 def check_format(content: Any, form: Mapping[str, Any], where: object) -> None:

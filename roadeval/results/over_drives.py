@@ -83,7 +83,7 @@ def summarise(
         totals=_totals(scores),
         effects=differences,
         strata=parts,
-        warnings=[*_warnings_of_copies(copies, cameras), *_warnings_of_drives(rows)],
+        warnings=[*_warnings(copies, cameras, rows)],
         run=run,
         misfits=[*_misfits(rows)],
         disturbances=_degradations(disturbances or {}, groups, settings.confidence),
@@ -171,10 +171,15 @@ def _totals(scores: pd.DataFrame) -> Totals:
     return {name: rows.droplevel("variant").to_dict("index") for name, rows in by_variant}
 
 
-def _warnings_of_copies(
-    originals: Mapping[str, str], cameras: Mapping[str, str | None]
+def _warnings(
+    originals: Mapping[str, str],
+    cameras: Mapping[str, str | None],
+    drives: Sequence[Mapping[str, Any]],
 ) -> Iterator[str]:
-    """Yield how drives of the same log are counted: copies, or cameras of a rig."""
+    """Yield how drives of the same log are counted, and the warnings of the drives.
+
+    Warnings that differ only by numbers are one.
+    """
     copies = {copy: of for copy, of in originals.items() if cameras[copy] == cameras[of]}
     if len(originals) > len(copies):
         yield "in differences the cameras of a log are averaged to one drive"
@@ -186,6 +191,16 @@ def _warnings_of_copies(
             f"{copy} is a copy of {of}{more}: differences count copies as one "
             "drive, the means of rates do not"
         )
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for row in drives:
+        for sentence in (row["warnings"] or "").splitlines():
+            alike.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
+    ranked = sorted(alike.values(), key=lambda warnings: -len(warnings))
+    for (drive, sentence), *others in ranked[:WARNINGS]:
+        more = f" (and {len(others)} more alike)" if others else ""
+        yield f"{drive}{more}: {sentence}"
+    if len(ranked) > WARNINGS:
+        yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"
 
 
 def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -197,17 +212,3 @@ def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         first = rows[0]["misfits"].splitlines()[0]
         where = f"{len(rows)} of {len(drives)} drives ({named}{more})"
         yield f"Truth or masks do not fit the images on {where}: {first}"
-
-
-def _warnings_of_drives(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the drives' warnings, together if they differ by numbers only."""
-    alike: dict[str, list[tuple[str, str]]] = {}
-    for row in drives:
-        for sentence in (row["warnings"] or "").splitlines():
-            alike.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
-    ranked = sorted(alike.values(), key=lambda warnings: -len(warnings))
-    for (drive, sentence), *others in ranked[:WARNINGS]:
-        more = f" (and {len(others)} more alike)" if others else ""
-        yield f"{drive}{more}: {sentence}"
-    if len(ranked) > WARNINGS:
-        yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"
