@@ -134,7 +134,13 @@ def history(
         except RoadevalError as error:
             lost.append(error.sentence)
             continue
-        origins[path] = _origin(result, path)
+        origin = result.facts.origin or Origin()
+        file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
+        made_ns = min(max(origin.made_ns or file.stat().st_mtime_ns, 0), 2**63 - 1)
+        labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+        origins[path] = replace(
+            origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels
+        )
         if result.fleet is None:
             drives[path] = result
     runs = _runs_in_order(origins, by, lost)
@@ -237,15 +243,6 @@ def _runs_in_order(
     titles = [f"{t} ({n + 1})" if n else t for t, n in zip(titles, times_before, strict=True)]
     paths = [tuple(path for _, path in members) for members in groups.values()]
     return [RunFacts(*run) for run in zip(paths, firsts, titles, strict=True)]
-
-
-def _origin(result: Result, path: Path) -> Origin:
-    """Return how a result was made; if it states no time, that of its file."""
-    origin = result.facts.origin or Origin()
-    file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
-    made_ns = min(max(origin.made_ns or file.stat().st_mtime_ns, 0), 2**63 - 1)
-    labels = {visible(name): visible(text) for name, text in origin.labels.items()}
-    return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
 
 
 def _read_rows(
