@@ -12,7 +12,6 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError, compare, replay, replay_fleet
-from roadeval.jobs.results.compare import as_json
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, PIXELS, settings, write_log, write_module
 from tests.results.fleet.making import fleet_of
@@ -57,10 +56,10 @@ def test_a_comparison_that_lasts_tells_how_many_drives_are_done(fleets, monkeypa
 
 def test_drives_that_the_base_lacks_may_be_read_apart(fleets, tmp_path, monkeypatch):
     pair = fleet_of(tmp_path / "base", 2), fleets[1]
-    together = as_json(compare(pair))
+    together = compare(pair).content
     monkeypatch.setattr("roadeval.evaluation.comparison.compare.FRAMES", 1)
-    assert as_json(compare(pair)) == together
-    assert "drives are left out of new (not in base)" in together
+    assert compare(pair).content == together
+    assert "drives are left out of new (not in base)" in str(together["warnings"])
 
 
 def test_a_method_whose_code_has_changed_is_named(tmp_path, monkeypatch):
