@@ -14,7 +14,8 @@ class RoadevalError(Exception):
 
     Its text is one line, without the passwords of URLs. It names settings as Python does. The
     terminal prints it without a traceback, names settings by their flags, and exits with code 1.
-    Rooms derive their own errors from it; anything else that escapes is a defect of the program.
+    A room derives an error of its own if some caller must tell it apart. Anything else that escapes
+    is a defect of the program.
     """
 
     def __init__(

@@ -47,7 +47,7 @@ from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.threads import map_ordered
 from roadeval.training import learning
 from roadeval.training.learning import Schedule
-from roadeval.training.model import Model, ModelError
+from roadeval.training.model import Model
 from roadeval.training.settings import TrainingSettings
 from roadeval.version import VERSION
 
@@ -253,7 +253,7 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     try:
         chains = bind(variants, model)
     except MisfitError as error:
-        raise ModelError.of(error, config.training.model) from error
+        raise RoadevalError.of(error, config.training.model) from error
     trim()
     layouts = [variant.layout() for variant in variants]
     for name, source in selection.masks.items():
