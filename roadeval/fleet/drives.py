@@ -144,7 +144,7 @@ class DriveEntry:
         return self.group, self.tags, self.settings
 
     def of_cameras(self, cameras: Iterable[CameraSettings]) -> Iterator[DriveEntry]:
-        """Yield an entry for each of some cameras; itself if its own settings state the camera."""
+        """Yield an entry for each camera, or this entry if its own settings state the camera."""
         if self.camera:
             yield self
             return

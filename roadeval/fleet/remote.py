@@ -61,7 +61,7 @@ PIECE: Final = 1 << 20
 ROOM: Final = 2 << 30
 """Greatest number of bytes of a result that are fetched, and that are unpacked."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
-_home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # until the process ends
+_home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # kept until the end
 _POLL_S: Final = 0.2
 """Seconds between two checks for an answer."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
@@ -227,7 +227,8 @@ class _RemoteFile(FarFile):
             part = self._parts[place]
             self._next = max(self._next, place + 1)
         else:
-            # The file's end is read at once, and a byte more, as a chunk's last one is read alone.
+            # The end of the file, and one byte more, is read at once: a chunk's last byte is read
+            # alone.
             first, last = min(begin, max(self._size - TAIL, 0)), max(end + 1, begin + PART)
             part = self._parts.pop(place) if place >= 0 else _Part(first, min(last, self._size))
             if part.end - part.begin <= PIECE:

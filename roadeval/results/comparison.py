@@ -42,9 +42,9 @@ def condition_of(judgement: Judgement) -> dict[str, Any]:
 
 
 def changed_settings(comparison: Comparison, most: int | None = None) -> list[str]:
-    """Return a line for each new result on the settings that differ from the base's.
+    """Return a line for each new result on the settings in which it differs from the base.
 
-    ``most`` is the number of settings to name; all by default.
+    ``most`` limits the number of settings that are named; by default all are named.
     """
     lines = []
     for label, settings in comparison.changed_settings.items():
@@ -136,7 +136,7 @@ def _mask_name(result: str, variant: str) -> str:
 
 
 def changed_drives(comparison: Comparison) -> list[str]:
-    """Return a line for each final mask: on how many drives it changed, in which direction."""
+    """Return a line for each final mask: on how many drives it changed, and in which direction."""
     lines = []
     for mask in dict.fromkeys((row.result, row.variant) for row in comparison.drives):
         drives = [row for row in comparison.drives if (row.result, row.variant) == mask]
@@ -169,7 +169,7 @@ def describe_judgement(judgement: Judgement) -> str:
 
 
 def headline(holds: Sequence[bool | None]) -> str:
-    """Return whether all limits were kept; ``holds`` are as of `Judgement.holds`."""
+    """Return whether all limits were kept; ``holds`` has the values of `Judgement.holds`."""
     if all(exceeded is False for exceeded in holds):
         return f"passed, {len(holds)} limit{'s' * (len(holds) > 1)} kept"
     counts = {"exceeded": holds.count(True), "not judged": holds.count(None)}

@@ -1,7 +1,7 @@
 """The facts of a result: ``summary.json`` of a drive, ``fleet.json`` of many drives.
 
-Both are read into one tree of types, which is checked, and written from it. ``digest`` is a
-checksum of the parts that are results, so a changed number is damage.
+Each file is read into a tree of types, which is checked, and is written from that tree. ``digest``
+is a checksum of the parts that are results, so a changed number is damage.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ FETCHED: Final[dict[Path, str]] = {}
 def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
     """Return the variant that a result is about: the chosen one, else the first that was brought.
 
-    If the user brought none, it is the first one; None if there is no variant. A `RoadevalError`
-    if the chosen one is not there.
+    If the user brought no variant, it is the first one; None if there is no variant. A
+    `RoadevalError` if the chosen one is not there.
 
     >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
     'mine'
@@ -83,7 +83,7 @@ class DriveFacts:
     topics: list[str] = field(default_factory=list)
     calibration: Calibration | None = None
     ground: Ground | None = None
-    """The camera's calibration and the ground before it, for images of this size."""
+    """The camera's calibration and the ground in front of it, for images of this size."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +307,7 @@ class Facts(FactsFile):
     drive: DriveFacts
     frames: FrameAccount
     totals: Totals
-    """Empty if nothing was scored."""
+    """It is empty if nothing was scored."""
     beyond: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Numbers of each final mask beyond its rates: edges, flicker, error episodes."""
     curves: Totals = field(default_factory=dict)
@@ -351,11 +351,11 @@ class Facts(FactsFile):
     """Facts that stages state about themselves, as networks do."""
     versions: dict[str, str] = field(default_factory=dict)
     unlabelled: UnlabelledFacts | None = None
-    """None if every frame has truth."""
+    """It is None if every frame has truth."""
     estimate: EstimateFacts | None = None
     """Rates of the whole drive, if picked frames are the truth."""
     log: LogFacts | None = None
-    """None after a run that ended early."""
+    """It is None after a run that ended early."""
     masks: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Labels that are not in the log: masks of other systems by their variant, and ``truth``."""
     tables: dict[str, TableFacts] = field(default_factory=dict)
@@ -364,7 +364,7 @@ class Facts(FactsFile):
     cameras: dict[str, Facts] = field(default_factory=dict)
     """The facts of each camera of a rig, by its name."""
     origin: Origin | None = None
-    """None in older results, and in a recording, which does not state its time."""
+    """It is None in older results, and in a recording, which does not state its time."""
 
     FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
     AGAIN = "make it again with roadeval replay"
@@ -486,9 +486,9 @@ class FleetFacts(FactsFile):
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, over drives."""
     why: dict[str, list[Reason]] = field(default_factory=dict)
-    """As in `Facts`."""
+    """The reasons are as in `Facts`."""
     slices: dict[str, list[Slice]] = field(default_factory=dict)
-    """As in `Facts`, over groups of drives."""
+    """The slices are as in `Facts`, over groups of drives."""
     origin: Origin | None = None
     """The origin of the last run; None in older results."""
 

@@ -1,9 +1,9 @@
 """A fleet's folder: the results folders of its drives, and a cache of their tables in Parquet.
 
-Beside a drive's results lies a file that says how they were made; it is written last. A drive is
-done if that file exists and names the same log, settings, model and version. The frames of each
-drive, and the scores that follow from them, are cached. If a cache is missing or old, it is made
-again from the results.
+A file beside a drive's results says how they were made; it is written last. A drive is done if that
+file exists and names the same log, settings, model and version. The frames of each drive, and the
+scores that follow from them, are cached. If a cache is missing or old, it is made again from the
+results.
 """
 
 from __future__ import annotations
@@ -71,19 +71,19 @@ if TYPE_CHECKING:
 WRITTEN: Final = (*OF_DRIVES, "classes")
 """The tables of all drives in one file; older fleets have no ``classes``."""
 FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
-"""The files of a fleet's folder; beside them lie folders with the files of its drives."""
+"""The files of a fleet's folder; folders beside them have the files of its drives."""
 RESULTS: Final = "results"
 PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
 """Number of frames in the table of the worst."""
 OF_A_DRIVE: Final = 3
-"""Frames of a drive that are among its worst, at most."""
+"""Greatest number of frames of a drive that are among its worst."""
 APART_NS: Final = 3_000_000_000
-"""Neighbours fail alike: of frames that are closer than this only the worst counts."""
+"""Neighbouring frames fail alike: if frames are closer than this, only the worst one counts."""
 CACHED: Final = ("frames", "regions", "scores", "worst", "classes")
-"""Tables of each drive that are cached in folders of these names; ``regions`` of final masks. Older
-fleets have no ``classes``."""
+"""Tables of each drive that are cached in folders of these names. ``regions`` has the rows of final
+masks. Older fleets have no ``classes``."""
 
 
 def results_path(folder: Path, drive: str) -> Path:
@@ -142,7 +142,7 @@ class Made(FactsFile):
     RESULTS = ("drive", "asked", "stamp", "results", "problem")
 
     def write(self, folder: Path) -> None:
-        """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
+        """Write the file into a fleet's folder as a whole; an OSError if that fails."""
         summary = "" if self.problem else sha256_of(results_path(folder, self.drive) / SUMMARY)
         content = json.dumps(replace(self, results=summary).as_dict(), allow_nan=False)
         put(made_path(folder, self.drive), content.encode())
@@ -155,7 +155,7 @@ def read_made(folder: Path, drive: str) -> Made | None:
         made = Made.parse(read_bounded(path), path)
         summary = "" if made.problem else sha256_of(results_path(folder, drive) / SUMMARY)
     except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
-        return None  # missing, of another version, or incomplete: it is made again
+        return None  # the results are missing, old or incomplete
     except OSError as error:
         raise ResultsError(f"{path}: {error.strerror}") from error
     return made if (made.drive, made.results) == (drive, summary) else None
@@ -360,7 +360,7 @@ class FleetWriter:
         with writing(self.folder, ResultsError):
             check_output(self.folder, folder=True)
             if is_fleet(self.folder):
-                with suppress(ValueError):  # damage: it is written again
+                with suppress(ValueError):  # a damaged file is written again
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
             elif not (self.folder / RESULTS).is_dir() and any(self.folder.glob("*")):
@@ -384,8 +384,8 @@ class FleetWriter:
         """Write the tables of all drives and the facts that follow from them.
 
         ``members`` are in the order of the tables. ``run`` and ``run_toml`` are the configuration
-        of the fleet, as plain data and as a text. ``asked`` are the digests of `Made.asked` that
-        drives must have; any by default.
+        of the fleet, as plain data and as a text. ``asked`` has the accepted values of
+        `Made.asked`; by default all are accepted.
         """
         # Two commands may replay drives of one folder together.
         with (
@@ -416,7 +416,7 @@ class FleetWriter:
             self._add(member, self._read_made(member.drive, digests), rows)
         try:
             made = self._read_cache(rows["cached"])
-        except ResultsError:  # damaged: the cache is made anew
+        except ResultsError:  # a damaged cache is made again
             for name in CACHED:
                 shutil.rmtree(check_inside(self.folder / name, self.folder), ignore_errors=True)
             made = self._read_cache(rows["cached"], again=True)
@@ -469,7 +469,7 @@ class FleetWriter:
         }
 
     def _read_made(self, drive: str, digests: Mapping[str, str]) -> Made:
-        """Return how a drive's results were made; an error if they are gone, or other ones."""
+        """Return how a drive's results were made; an error if they are missing or were replaced."""
         made = read_made(self.folder, drive)
         if made is None:
             raise ResultsError(

@@ -47,8 +47,8 @@ def summarise(
 
     ``tables`` are ``drives``, and the rows of ``scores`` and ``effects`` of final masks on all
     pixels. ``within_one`` are the differences within the drive if only one was scored;
-    ``disturbances`` those of each drive. ``read`` reads a table of some drives, in which slices are
-    searched.
+    ``disturbances`` has the degradations of each drive. ``read`` reads a table of some drives, in
+    which slices are searched.
     """
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
@@ -128,16 +128,16 @@ def slices_over_drives(
     groups: Mapping[str, str],
     confidence: float,
 ) -> dict[str, list[Slice]]:
-    """Return the slices of each final mask; nothing with too few groups of drives.
+    """Return the slices of each final mask; there are none with too few groups of drives.
 
-    Every drive counts the same. Beside measured quantities there are tags and times: in the drive,
-    and of the day if the stamps are of this century.
+    Every drive counts the same. Conditions are measured quantities, tags, the time since the
+    drive's start, and the time of day if the stamps are of this century.
     """
     scored = drives["drive"][drives["evaluated"].fillna(0) > 0].tolist()
     if len({groups[drive] for drive in scored}) < 2 * LEAST_GROUPS:
         return {}
     conditions, frames, parts = (read(name, scored) for name in ("conditions", "frames", "regions"))
-    if not len(conditions):  # made before they were measured
+    if not len(conditions):  # older results lack them
         return {}
     stamps = conditions["stamp_ns"]
     starts = stamps.groupby(conditions["drive"], observed=True).transform("min")

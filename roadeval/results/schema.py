@@ -59,8 +59,8 @@ class Column(NamedTuple):
 
 
 LATER: Final = ("truth",)
-"""Columns of counts that the first files of this format lack; they are read as 0, for unknown.
-If any other column is missing, the file is damaged."""
+"""Columns of counts that the first files of this format lack; they are read as 0, which stands for
+unknown. If any other column is missing, the file is damaged."""
 
 
 class TableSchema(NamedTuple):
@@ -68,7 +68,7 @@ class TableSchema(NamedTuple):
 
     name: str
     doc: str
-    """Describes a row."""
+    """The meaning of a row."""
     columns: tuple[Column, ...]
     """The columns in the order of the file."""
 

@@ -50,7 +50,7 @@ class Audit:
     sentences: list[str]
     """Sentences on misfits of the whole drive, on wrong labels, and on other annotators."""
     log: str
-    """Where the log lies."""
+    """The place of the log."""
     config: Path | None
     """The file for ``--config`` that repeats its replay; None if there is none."""
 
@@ -145,7 +145,7 @@ def _view(drive: DriveResult, frame: int) -> LabelledView:
 def _write_audit(
     drive: DriveResult, suspects: pd.DataFrame, folder: Path, labels: str, run: str | None
 ) -> None:
-    """Write images, labels to correct and pictures, and last what was found."""
+    """Write images, labels to correct and pictures, and at the end the list of suspects."""
     import cv2
 
     recording, facts, rows = drive.recording, drive.facts, records(suspects)

@@ -57,15 +57,16 @@ def clip(
         one = "a file holds one clip: name a folder"
         none = "no pictures of such frames were kept; --record keeps some, and in a fleet --keep"
         raise RoadevalError(one if scenes else none, where=place if scenes else result)
-    # With its matrix stated, no player guesses it from the size. With x264's tree of macroblocks
-    # (build 165, AVX-512), one encoding in a hundred of equal pictures has other bytes.
+    # The colour matrix is stated, because a player would guess it from the size. x264's tree of
+    # macroblocks is off: with it (build 165, AVX-512) one encoding in a hundred of equal pictures
+    # has other bytes.
     options = {"crf": "20", "preset": "veryfast", "colorspace": "smpte170m"}
     options["x264-params"] = "mbtree=0"
     total = sum(len(numbers) for _, numbers, _ in scenes)
     steps = map(on_progress, (Progress(done, total, "filming") for done in count(1)))
     titles = [drive.title for drive in drives]
     for drive, numbers, name in scenes:
-        part = drive.path.stem if titles.count(drive.title) > 1 else ""  # drives of one name
+        part = drive.path.stem if titles.count(drive.title) > 1 else ""  # names may repeat
         path = place if form else place / part / f"{name}.mp4"
         log = path.with_suffix(".mcap") if mcap else None
         inputs = [result, drive.path, getattr(drive.facts.log, "path", None)]
@@ -99,7 +100,7 @@ def _scenes(
 def _film(
     drive: DriveResult, frames: Sequence[int], steps: Iterator[None]
 ) -> tuple[Fraction, Iterator[Rgb]]:
-    """Return frames a second, 2 to 30, and the pictures: the focus, and the best other variant."""
+    """Return 2 to 30 frames a second, and the pictures: the focus and the best other variant."""
     recording, picker = drive.recording, FramePicker(drive)
     assert recording is not None
     variants = [variant.name for variant in recording.variants]

@@ -49,9 +49,9 @@ class Compared:
     sides: tuple[Side, ...]
     """The results with the only drive that is compared; empty for several drives."""
     recordings: Mapping[str, DriveResult]
-    """By the results' labels; a folder has none."""
+    """The recordings by the results' labels; a folder has none."""
     lost: tuple[str, ...] = ()
-    """Drives of a fleet that failed, and runs that cannot be read; among the warnings, too."""
+    """Drives of a fleet that failed, and runs that cannot be read; the warnings name them, too."""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -163,7 +163,7 @@ def _choose_sides(
 ) -> list[Side]:
     """Return several results, each with those of its variants that are compared.
 
-    A result is named by its file, or by its whole path where another has the same name.
+    A result is named by its file, or by its whole path if another has the same name.
     """
     stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
     labels: list[str] = []
@@ -217,9 +217,9 @@ def as_json(compared: Compared) -> str:
 
 
 NAMED: Final = 5
-"""Drives that failed, which are named."""
+"""Greatest number of failed drives that are named."""
 ROWS: Final = 60
-"""Points of the figure over the drive, at most."""
+"""Greatest number of points of the figure over the drive."""
 
 
 def _frames(side: Side) -> pd.DataFrame:
@@ -228,7 +228,7 @@ def _frames(side: Side) -> pd.DataFrame:
 
 
 def over_drive(compared: Compared) -> list[Chart]:
-    """Return ERR over the one drive, and the baseline's, on the frames that all results have."""
+    """Return ERR of results and baseline over the one drive, on the frames of all results."""
     masks_of = {side.label: finals(_frames(side)) for side in compared.sides}
     alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
     masks, parts = {}, []
@@ -251,6 +251,6 @@ def over_drive(compared: Compared) -> list[Chart]:
     size = compared.comparison.settings.window
     size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
     rows = rows.assign(drive="", camera="")  # the results may call them differently
-    # A hue a variant, a dash a result.
+    # Each variant has a colour, and each result has a dash.
     by_mask = looks_of_results(masks) | looks([BASELINE])
     return over_windows(windows(rows, size), [TESTED], by_mask)

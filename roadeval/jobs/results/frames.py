@@ -33,10 +33,11 @@ if TYPE_CHECKING:
 
 WORST: Final = 4
 MOVED: Final = 2
-"""Frames that a report shows: the worst, and those that the filter helped and harmed most."""
+"""Number of the worst frames that a report shows, and of frames that the filter helped or harmed
+most."""
 ERRORS_SHOWN: Final = 6
 LAYERS: Final = 2
-"""Number of variants of which such a frame shows the errors, and all layers, on paper."""
+"""On paper a frame shows the errors, and all layers, of so many variants."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -66,8 +67,8 @@ def rates_by_frame(
 class FramePicker:
     """Picks frames of a result and collects their pictures and facts.
 
-    ``outcomes`` and ``layered`` are how many variants' errors, and layers, are shown at most; None
-    for all.
+    A frame shows the errors of at most ``outcomes`` variants, and the layers of at most ``layered``
+    variants; None stands for all.
     """
 
     def __init__(
@@ -107,9 +108,9 @@ class FramePicker:
         return LayerImage(f"{variant}: {spec.name}", image, spec, layer)
 
     def worst(self) -> list[NotableFrame]:
-        """Return the worst frames of the focus, one a scene, all worse than the mean.
+        """Return the worst frames of the focus: one of each scene, if it is worse than the mean.
 
-        Without truth they are the most uncertain frames that have pictures.
+        Without truth these are the most uncertain frames that have pictures.
         """
         if self._focus is None:
             unlabelled = self._result.facts.unlabelled
@@ -122,7 +123,7 @@ class FramePicker:
         return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
-        """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
+        """Return the frames that the filter harmed or helped most, of scenes not yet shown."""
         pairs = tables.changes(self._result.rows, FILTERED, UNFILTERED)
         apart, besides = scene_ns(pairs["stamp_ns"]), [frame.stamp_ns for frame in shown]
         rows = tables.most_changed_frames(
@@ -132,14 +133,14 @@ class FramePicker:
         return [self._notable(*row) for row in columns.itertuples(index=False)]
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
-        """Return a frame with its pictures, those of layers of at most so many pixels across."""
+        """Return a frame with its pictures; pictures of layers are at most so many pixels wide."""
         made = self._pictured(frame)
         above = [*self._from_above(made)]
         made = replace(made, layers=[*made.layers, *([above] if above else [])])
         return strip(made, self._all, self._result.inspect(frame), layers)
 
     def _from_above(self, made: NotableFrame) -> Iterator[LayerImage]:
-        """Yield camera, truth and errors of a frame as they look from above, on known ground."""
+        """Yield camera, truth and errors of a frame as seen from above, if the ground is known."""
         facts = self._result.facts
         if (ground := facts.drive.ground) is None:
             return
@@ -187,7 +188,7 @@ class FramePicker:
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
 
-        The first of a row bears the variant's name, too.
+        The first picture of a row has the variant's name, too.
         """
         image = recording.image(frame)
         focus_first = sorted(recording.variants, key=lambda variant: variant.name != self._focus)
@@ -206,7 +207,7 @@ class FramePicker:
 
 
 def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
-    """Yield every frame of the table: those evaluated, or without truth those with pictures."""
+    """Yield the frames of the table: evaluated frames, or without truth frames with pictures."""
     frames, focus = result.rows, result.focus or ""
     if not len(frames):
         doubts = [*rates_by_frame(result.table("unlabelled"), [*SIGNS])]
@@ -223,7 +224,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         if focus in rates and focus != BASELINE:
             errors = defaultdict(lambda: math.nan, {name: rates[name][TESTED] for name in rates})
             health = judge(rates[focus], rates.get(BASELINE))
-            change = errors[FILTERED] - errors[UNFILTERED]  # NaN without one of the two
+            change = errors[FILTERED] - errors[UNFILTERED]  # it is NaN if one of the two is missing
             holds = {
                 f"{focus} {health}": health is not Health.OK,
                 f"the filter {'harms' if change > 0 else 'helps'}": abs(change) >= NOTEWORTHY,

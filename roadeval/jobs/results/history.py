@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 EARLIER: Final = 7
-"""Number of runs before the last one; conditions compare it with their mean."""
+"""Number of runs before the last one; conditions compare the last one with their mean."""
 DETAILED: Final = 5
 """Number of newest events with named frames."""
 FRAMES: Final = 5
@@ -58,7 +58,7 @@ DRIVES: Final = 3
 NEAR: Final = 10
 """Number of runs on each side of a step; their frames are compared if there is one drive."""
 BATCH: Final = 30
-"""Results whose tables are in memory together."""
+"""Number of results that have their tables in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *search.RATES),
     "drives": (*KEY, "name", "log_digest", "group", "status"),
@@ -74,9 +74,9 @@ class Listing:
     """The results below some places, listed once."""
 
     places: Sequence[tuple[Path, Sequence[Path]]]
-    """Each place with its results: itself, or those below the folder."""
+    """Each place with its results: the place itself, or the results below the folder."""
     errors: Sequence[RoadevalError] = ()
-    """Why other places have none."""
+    """The reasons why other places have none."""
 
     @property
     def paths(self) -> list[Path]:
@@ -85,7 +85,7 @@ class Listing:
 
 
 class TooFewRunsError(RoadevalError):
-    """Fewer than two runs, with those that can be read, and why others cannot."""
+    """There are fewer than two runs; the error has the readable runs, and why others are lost."""
 
     def __init__(self, runs: Sequence[RunFacts], lost: Sequence[str]) -> None:
         problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
@@ -167,7 +167,7 @@ def history(
 
 
 def list_results(results: Paths | Listing) -> Listing:
-    """Return the results at some places, or below them; a listing as it is."""
+    """Return the results at some places, or below them; a listing is returned unchanged."""
     if isinstance(results, Listing):
         return results
     places, errors = list[tuple[Path, Sequence[Path]]](), list[RoadevalError]()
@@ -181,7 +181,7 @@ def list_results(results: Paths | Listing) -> Listing:
 
 
 def find_results(path: Path) -> list[Path]:
-    """Return a result's path, or those of the results below a folder, without linked folders.
+    """Return the path of a result, or the paths of the results below a folder, but not in links.
 
     Recordings count only if there is no folder of results. A `RoadevalError` if there is none.
     """
@@ -201,10 +201,10 @@ def find_results(path: Path) -> list[Path]:
 
 
 def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path, Sequence[str]]:
-    """Return the first place's result, or the newest of its runs before a lasting step to worse.
+    """Return the result of the first place, or its newest run before a lasting step to worse.
 
-    Results of the other places are no runs of the folder. Returned with it are the runs that could
-    not be read, and why. A `RoadevalError` if none can be read.
+    Results of the other places are no runs of the folder. The runs that could not be read are
+    returned, too, and why. A `RoadevalError` if none can be read.
     """
     (place, runs), *others = listing.places
     taken = {path.resolve() for path in Listing(others).paths}
@@ -251,9 +251,9 @@ def _read_rows(
     lost: list[str],
     on_progress: OnProgress,
 ) -> pd.DataFrame:
-    """Return the rows for `find_lines` of runs, whose results are ``drives`` and fleets.
+    """Return the rows for `find_lines`; the results of the runs are ``drives`` and fleets.
 
-    Of a drive that a run has twice the later result counts.
+    If a run has a drive twice, the later result counts.
     """
     paths = [Path(path) for run in runs for path in run.paths]
     run_of = np.array([number for number, run in enumerate(runs) for _ in run.paths])
@@ -285,8 +285,8 @@ def _read_rows(
 def _read_batch(
     batch: Sequence[tuple[int, Path]], drives: Mapping[Path, Result], name: str, lost: list[str]
 ) -> Iterator[pd.DataFrame]:
-    """Yield a table of one drive, or of some fleets: together unless one of them is damaged."""
-    if name == "classes":  # not every fleet has some
+    """Yield a table of one drive, or of fleets, which are read together unless one is damaged."""
+    if name == "classes":  # older fleets lack this table
         batch = [run for run in batch if run[1] in drives or (run[1] / "classes.parquet").is_file()]
     numbers, paths = [number for number, _ in batch], [path for _, path in batch]
     is_scores = name == "scores"
@@ -305,7 +305,7 @@ def _read_batch(
 
 
 def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows for `find_lines` from tables of all results, whose number is ``run``."""
+    """Return the rows for `find_lines` from tables of all results; ``run`` numbers the results."""
     import pandas as pd
 
     is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
@@ -330,7 +330,7 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     columns = [*RUN_KEY, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
-    # A merge over other categories would make texts of them.
+    # If the categories differ, a merge turns them into texts.
     rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
     return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 

@@ -1,4 +1,4 @@
-"""The content of a drive's page: its video, its frames with pictures, and what can be chosen."""
+"""The content of a drive's page: its video, its frames with pictures, and the reader's choices."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 PICTURED: Final = 8
-"""Frames of a page with pictures of all layers, at most."""
+"""Greatest number of frames of a page with pictures of all layers."""
 BYTES: Final = 9_900_000
-"""Size of a page, at most."""
+"""Greatest size of a page."""
 FILMED: Final = 500
-"""Frames of a page's video, at most: a longer drive is thinned."""
+"""Greatest number of frames of a page's video; a longer drive is thinned."""
 PROBABILITY_LAYER: Final = "probability"
 """The layer of a stage that tells how probable road is."""
 FILM_BYTES: Final = 30_000
-"""Bytes of a page's video, at most, for each frame; a third more as text of the page."""
+"""Greatest number of bytes of a page's video for each frame; the text of the page has a third
+more."""
 
 
 def browsed(result: DriveResult) -> FrameBrowser:
@@ -73,7 +74,7 @@ def browsed(result: DriveResult) -> FrameBrowser:
 
 
 def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
-    """Yield the thresholds that can be moved: of stages that tell how probable road is."""
+    """Yield the threshold of each stage that tells how probable road is; the reader can move it."""
     facts, levels = result.facts, result.table("probabilities")
     for variant, stages in facts.curves.items():
         for stage in stages:
@@ -136,9 +137,9 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
-    """Return frames with their pictures, in the drive's order: the worst, and others.
+    """Return the worst frames, and others, with their pictures in the drive's order.
 
-    At most `PICTURED`, and as many as have room in so many bytes of a page.
+    There are at most `PICTURED`, and no more than fit into so many bytes of a page.
     """
     if result.recording is None:
         return []
@@ -146,7 +147,7 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     picker, strips = FramePicker(result, None, None), []
     for done, frame in enumerate(chosen, 1):
         made = picker.strip(frame)
-        # On a page pictures are text, with words around each.
+        # A page holds a picture as a text, and has words around it.
         room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
         if room < 0:
             break
@@ -156,7 +157,7 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
 
 
 def _choose_frames(result: DriveResult, count: int) -> list[int]:
-    """Return frames to picture: the worst of the focus first, then others evenly spread."""
+    """Return the frames to show: first the worst of the focus, then others, evenly spread."""
     rows = result.rows
     scored_frames = {*rows["frame"]}
     there = [number for number in result.pictured if number in scored_frames]

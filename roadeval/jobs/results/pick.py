@@ -43,11 +43,11 @@ class PickedFrames:
 
     folder: Path
     picks: Picks
-    """All so far."""
+    """All frames that were picked so far."""
     new: int
     """Frames to label that this command has added."""
     log: str
-    """Where the log lies."""
+    """The place of the log."""
     config: Path
     """The file for ``--config`` that repeats its replay: the recording, or ``run.toml`` beside the
     picks of a log that was replayed here."""
@@ -122,7 +122,7 @@ def open_drives(
 ) -> list[tuple[Path, DriveResult, str | None]]:
     """Open the recordings of some results; a log is replayed into a folder.
 
-    Returned are each one's path, its result, and the configuration of a log that was replayed.
+    Return the path and the result of each, and the configuration of a log that was replayed.
     """
     from roadeval.jobs.run.replay import replay
 
@@ -146,7 +146,7 @@ def open_drives(
 
 
 def find_recordings(source: Path) -> list[Path]:
-    """Return the recordings that a fleet has kept, or that of a results folder; else itself."""
+    """Return the recordings of a fleet or of a results folder; another path is returned itself."""
     if not is_fleet(source):
         if not (source / SUMMARY).is_file():
             return [source]
@@ -191,7 +191,7 @@ def _pick_frames(
     doubts = only(rows, variant=name)
     picks_before = _begin_picks(drive, folder, doubts, source, seed)
     scores = picks_before.every_score()
-    if (sign := sign_of(doubts)) is not None:  # how much they are in doubt by now
+    if (sign := sign_of(doubts)) is not None:  # the present doubt replaces the earlier one
         now = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
         scores = np.array([now.get(float(stamp), np.nan) for stamp in picks_before.stamps])
     taken = [picks_before.places[stamp] for stamp in picks_before.by_stamp]
@@ -260,9 +260,9 @@ def _begin_picks(
 def _write_picks(
     drive: DriveResult, picks: Picks, new: NewPicks, folder: Path, *, labels: str, run: str | None
 ) -> None:
-    """Write images, masks to correct, and last what was picked.
+    """Write images and masks to correct, and at the end the picks.
 
-    ``run`` is the configuration as TOML, of a log that was replayed here; None of a recording.
+    ``run`` is the configuration, as TOML, of a log that was replayed here; a recording has None.
     """
     recording = drive.recording
     assert recording is not None
@@ -293,7 +293,7 @@ def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, byte
 def _add_picks(
     picks: Picks, random: Sequence[int], ranked: Sequence[int], proposals: Mapping[int, str]
 ) -> tuple[Picks, list[Picked]]:
-    """Return the picks with some more, and those that are new, by the drive's order.
+    """Add frames to the picks; return all picks, and the new ones in the drive's order.
 
     A frame that was ranked before, and is drawn now, becomes a random one.
     """

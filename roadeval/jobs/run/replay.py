@@ -240,7 +240,7 @@ def _record_frames(
     on_progress: OnProgress,
     on_frame: OnFrame,
 ) -> dict[str, list[ExampleFrame]]:
-    """Run over the frames; return those for the figure of masks, by camera."""
+    """Run over the frames; return the frames for the figure of masks, by camera."""
     examples = {run.camera: ExampleFrames(len(run.frames)) for run in runs}
     total = sum(len(run.frames) for run in runs)
     for position, (run, done) in enumerate(process(runs, recorder, on_progress), 1):

@@ -48,9 +48,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FEW: Final = 12
-"""Frames of a log that are looked at, with their neighbours, where nothing is replayed."""
+"""Number of frames of a log that are examined, with their neighbours, if nothing is replayed."""
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
-"""Signs that a frame has by itself, without the one before."""
+"""Signs of doubt that follow from one frame, without the frame before."""
 OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "why", "seconds")
 """Names of facts that only a single camera has, not a rig."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
@@ -244,7 +244,7 @@ def join_cameras(
 
 
 def _add_counts(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
-    """Add up the counts of cameras, which are trees of two names."""
+    """Add up the counts of cameras, which are nested by two names."""
     sums: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for part in parts:
         for name, counts in part.items():
