@@ -83,7 +83,7 @@ LOOP void mahalanobis(
     for (int place = 0; place < 9; place++)
         w[place] = (float)whitening[place];
     double limit = sqrt(greatest), error = rounding(whitening, limit);
-    float surely = (float)(limit - error), perhaps = (float)(limit + error);
+    float lower_limit = (float)(limit - error), upper_limit = (float)(limit + error);
     for (int64_t y = 0; y < height; y++) {
         const uint8_t *r = red + y * width, *g = green + y * width, *b = blue + y * width;
         float *d = distance + y * width;
@@ -91,11 +91,11 @@ LOOP void mahalanobis(
         for (int64_t x = 0; x < width; x++)
             d[x] = sqrtf(squared_single(r[x], g[x], b[x], m, w));
         for (int64_t x = 0; x < width; x++) {
-            n[x] = d[x] <= surely;
-            undecided |= n[x] ^ (uint8_t)(d[x] <= perhaps);
+            n[x] = d[x] <= lower_limit;
+            undecided |= n[x] ^ (uint8_t)(d[x] <= upper_limit);
         }
         for (int64_t x = 0; undecided && x < width; x++)
-            if (surely < d[x] && d[x] <= perhaps)
+            if (lower_limit < d[x] && d[x] <= upper_limit)
                 n[x] = squared(r[x], g[x], b[x], mean, whitening) <= greatest;
     }
 }
