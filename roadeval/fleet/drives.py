@@ -389,13 +389,13 @@ def _find_below(folder: Path) -> list[Path]:
         raise FleetError(error.strerror or str(error), where=where) from error
 
     drives: list[Path] = []
-    seen: set[Path] = set()
+    visited: set[Path] = set()
     for name, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
         here = Path(name)
-        if here.resolve() in seen:
+        if here.resolve() in visited:
             folders.clear()
             continue
-        seen.add(here.resolve())
+        visited.add(here.resolve())
         folders[:] = sorted(filter(is_usable, folders))
         drives += [here] if is_bag(here) else [here / file for file in files if is_log(file)]
     return sorted(drives, key=lambda path: natural_path(path.relative_to(folder)))

@@ -53,8 +53,8 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
         pairs = [(name, *map(setting, settings[name])) for name in names]
         named = [f"{name} {before} to {after}" for name, before, after in pairs]
         more = f"; and {len(named) - most} more" if most and len(named) > most else ""
-        of = f" in {label}" if len(comparison.results) > 2 else ""
-        lines.append(f"Changed settings{of}: {'; '.join(named[:most])}{more}.")
+        suffix = f" in {label}" if len(comparison.results) > 2 else ""
+        lines.append(f"Changed settings{suffix}: {'; '.join(named[:most])}{more}.")
     return lines
 
 
@@ -77,8 +77,8 @@ def unchanged(comparison: Comparison, masks: Iterable[MaskChange]) -> Iterator[s
     base = comparison.results[0].label
     for result, rows in groupby(masks, lambda row: row.result):
         names = dict.fromkeys(row.variant for row in rows)
-        of = "" if [*names] == [result] else f" of {result}"
-        yield f"{listing([*names])}{of}: every frame as in {base}."
+        suffix = "" if [*names] == [result] else f" of {result}"
+        yield f"{listing([*names])}{suffix}: every frame as in {base}."
 
 
 def where(comparison: Comparison) -> list[str]:
@@ -125,8 +125,8 @@ def why_unsure(differences: Iterable[Difference]) -> str:
         return ""
     if reasons := {change.none_because for change in changes if change.low is None} - {""}:
         return f"no interval, as {listing(sorted(reasons))}"
-    alone = [change for change in changes if is_sure(replace(change, p_holm=None))]
-    counts = [change.comparisons for change in alone if change.comparisons]
+    uncorrected = [change for change in changes if is_sure(replace(change, p_holm=None))]
+    counts = [change.comparisons for change in uncorrected if change.comparisons]
     family = f", as {max(counts)} regions are compared" if counts else ""
     return f"each change may be chance{family}"
 

@@ -55,9 +55,9 @@ def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
     """
     names = [name for name in variants if name != BASELINE]
     if chosen and chosen not in names:
-        there = f"there {'are' if len(names) > 1 else 'is'} {listing(names) or 'none'}"
+        choices = f"there {'are' if len(names) > 1 else 'is'} {listing(names) or 'none'}"
         likely = get_close_matches(chosen, names, 1)
-        remedy = f"did you mean {likely[0]}? {there.capitalize()}" if likely else there
+        remedy = f"did you mean {likely[0]}? {choices.capitalize()}" if likely else choices
         raise RoadevalError(f"there is no variant {chosen}", setting="output.focus", remedy=remedy)
     brought = [name for name in names if name not in (FILTERED, UNFILTERED)]
     return chosen or next(iter([*brought, *names]), None)

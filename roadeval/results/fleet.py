@@ -291,8 +291,8 @@ class FleetFolder:
 def rank_worst(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of ``worst`` with the highest ERR over all drives, with their ranks."""
     order = {TESTED: False, "drive": True, "frame": True}
-    words = rows.astype({"drive": "str"})
-    ranked = words.sort_values([*order], ascending=[*order.values()]).head(WORST)
+    with_texts = rows.astype({"drive": "str"})
+    ranked = with_texts.sort_values([*order], ascending=[*order.values()]).head(WORST)
     return ranked.assign(rank=np.arange(1, len(ranked) + 1))
 
 
@@ -415,42 +415,42 @@ class FleetWriter:
         for member in members:
             self._add(member, self._read_made(member.drive, digests), rows)
         try:
-            made = self._read_cache(rows["cached"])
+            cached = self._read_cache(rows["cached"])
         except ResultsError:  # a damaged cache is made again
             for name in CACHED:
                 shutil.rmtree(check_inside(self.folder / name, self.folder), ignore_errors=True)
-            made = self._read_cache(rows["cached"], again=True)
-        made["drives"] = table_of("drives", rows["drives"], tags)
-        made["effects"] = table_of("effects", rows["effects"])
-        made["worst"] = rank_worst(made["worst"])
-        made["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
-        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in WRITTEN})
+            cached = self._read_cache(rows["cached"], again=True)
+        cached["drives"] = table_of("drives", rows["drives"], tags)
+        cached["effects"] = table_of("effects", rows["effects"])
+        cached["worst"] = rank_worst(cached["worst"])
+        cached["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
+        write_parquet({self.folder / f"{name}.parquet": (name, cached[name]) for name in WRITTEN})
         finals = {
-            "drives": made["drives"],
-            "scores": only(made["scores"], final=True, region=ALL),
-            "effects": only(made["effects"], final=True),
+            "drives": cached["drives"],
+            "scores": only(cached["scores"], final=True, region=ALL),
+            "effects": only(cached["effects"], final=True),
         }
         within = rows["within"] if len(finals["effects"]["drive"].unique()) == 1 else []
         return finals, within, dict(rows["disturbed"])
 
     def _add(self, member: Member, made: Made, rows: Mapping[str, list[Any]]) -> None:
         """Add a drive's rows to those of each table."""
-        how: dict[str, Any] = {"drive": member.drive, "name": member.name, "source": member.source}
-        how |= {"group": member.group, "fold": made.fold, "model": made.model, "camera": ""}
-        how |= {f"{TAG}{key}": value for key, value in member.tags.items()}
+        row: dict[str, Any] = {"drive": member.drive, "name": member.name, "source": member.source}
+        row |= {"group": member.group, "fold": made.fold, "model": made.model, "camera": ""}
+        row |= {f"{TAG}{key}": value for key, value in member.tags.items()}
         if made.problem:
             failure = {"status": FAILED, "reason": made.problem, "exit_code": made.exit_code}
-            rows["drives"].append({**how, **failure})
+            rows["drives"].append({**row, **failure})
             return
         facts = Facts.read(results_path(self.folder, member.drive) / SUMMARY)
         key = Key(member.drive, visible(facts.drive.camera))
-        how |= {"camera": key.camera, "seconds": made.seconds}
+        row |= {"camera": key.camera, "seconds": made.seconds}
         rows["effects"] += effect_rows(facts, key)
         rows["within"] += facts.final_effects
         rows["disturbed"] += [(member.drive, facts.disturbances)] if facts.disturbances else []
         if facts.frames.evaluated:
             rows["cached"].append(member.drive)
-        rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
+        rows["drives"].append({**drive_row(facts, member.name, member.source), **row})
 
     def _read_cache(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
         """Return the cached sums of drives; make missing and old ones from their results."""

@@ -191,11 +191,11 @@ def _warnings(
             f"{copy} is a copy of {of}{more}: differences count copies as one "
             "drive, the means of rates do not"
         )
-    alike: dict[str, list[tuple[str, str]]] = {}
+    by_text: dict[str, list[tuple[str, str]]] = {}
     for row in drives:
         for sentence in (row["warnings"] or "").splitlines():
-            alike.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
-    ranked = sorted(alike.values(), key=lambda warnings: -len(warnings))
+            by_text.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
+    ranked = sorted(by_text.values(), key=lambda warnings: -len(warnings))
     for (drive, sentence), *others in ranked[:WARNINGS]:
         more = f" (and {len(others)} more alike)" if others else ""
         yield f"{drive}{more}: {sentence}"
@@ -207,8 +207,8 @@ def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield a sentence on the drives where truth or masks do not fit the images."""
     rows = [row for row in drives if row["misfits"]]
     if rows:
-        named = listing([row["drive"] for row in rows[:WARNINGS]])
+        names = listing([row["drive"] for row in rows[:WARNINGS]])
         more = f" and {len(rows) - WARNINGS} more" if len(rows) > WARNINGS else ""
         first = rows[0]["misfits"].splitlines()[0]
-        where = f"{len(rows)} of {len(drives)} drives ({named}{more})"
+        where = f"{len(rows)} of {len(drives)} drives ({names}{more})"
         yield f"Truth or masks do not fit the images on {where}: {first}"

@@ -43,11 +43,11 @@ NAMED: Final = 5
 
 def verdict_on(facts: Facts | FleetFacts) -> str:
     """Return the verdict on a drive or a fleet, after the sentences on what does not fit."""
-    more: dict[str, Any] = {"focus": facts.focus}
+    arguments: dict[str, Any] = {"focus": facts.focus}
     if isinstance(facts, Facts) and not facts.cameras:
-        more |= {"thresholds": facts.thresholds}
-        more |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
-    sentence = verdict(facts.totals, facts.effects, **more)
+        arguments |= {"thresholds": facts.thresholds}
+        arguments |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
+    sentence = verdict(facts.totals, facts.effects, **arguments)
     return Sentence(" ").join([*facts.misfits, sentence])
 
 
@@ -140,15 +140,15 @@ def _how_wrong(name: str, rates: Rates, differences: Sequence[Difference]) -> st
     """Return how many pixels a final mask has wrong, and which ones."""
     if not defined(rates[TESTED]):
         return f"{name}: {TESTED} is undefined on every frame."
-    of = counted(rates["frames"], "frame")
+    sample = counted(rates["frames"], "frame")
     if rates.get("drives", 1) > 1:
-        of = counted(rates["drives"], "drive")
+        sample = counted(rates["drives"], "drive")
         if groups := {change.groups or rates["drives"] for change in differences} - {
             rates["drives"]
         }:
-            of += f" in {counted(min(groups), 'group')}"
-    how = f" It {kinds}." if (kinds := describe_errors(rates)) else ""
-    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({of}).{how}"
+            sample += f" in {counted(min(groups), 'group')}"
+    errors = f" It {kinds}." if (kinds := describe_errors(rates)) else ""
+    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({sample}).{errors}"
 
 
 def describe_errors(rates: Rates) -> str:
@@ -169,14 +169,14 @@ def describe_errors(rates: Rates) -> str:
 
 def _compared(focus: str, differences: Mapping[str, Difference]) -> Iterator[str]:
     """Yield how the focus compares with the baseline and without the filter, here and on others."""
-    named = {BASELINE: BLIND} | ({UNFILTERED: "without the filter"} if focus == FILTERED else {})
-    there = [
+    names = {BASELINE: BLIND} | ({UNFILTERED: "without the filter"} if focus == FILTERED else {})
+    pairs = [
         (differences[base], name)
-        for base, name in named.items()
+        for base, name in names.items()
         if base in differences and differences[base].units
     ]
-    doubt = next((_no_interval(change) for change, _ in there if not change.is_zero), "")
-    points = [_points(change, name, alone=bool(doubt)) for change, name in there]
+    doubt = next((_no_interval(change) for change, _ in pairs if not change.is_zero), "")
+    points = [_points(change, name, alone=bool(doubt)) for change, name in pairs]
     if points:
         yield f"That is {', and '.join(points)}."
     if BASELINE not in differences:
@@ -223,13 +223,13 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
     """
     if not change.units:
         return f"Nothing to compare: {TESTED} is undefined on every {change.unit[:-1]}."
-    here = counted(change.units, change.unit[:-1])
+    sample = counted(change.units, change.unit[:-1])
     if change.groups not in (None, change.units):
-        here += f" in {counted(change.groups or 0, 'group')}"
+        sample += f" in {counted(change.groups or 0, 'group')}"
     if change.is_zero:
-        return f"{new} is exactly as good as {base} ({here})."
+        return f"{new} is exactly as good as {base} ({sample})."
     if change.better is not None:
-        here += f", better on {change.better}, worse on {change.worse}"
+        sample += f", better on {change.better}, worse on {change.worse}"
     before, after = (rates.get(TESTED) for rates in ends)
     size = f"by {_size(change.mean, change)} points"
     if defined(before) and defined(after) and abs(after - before - change.mean) < ROUNDING:
@@ -242,7 +242,7 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
         if is_sure(replace(change, p_holm=None)):
             family = f", as {change.comparisons} masks are compared"
         doubt = f"This may be chance{family}."
-    return f"{new} is {direction} than {base}: {size} ({here}). {doubt}"
+    return f"{new} is {direction} than {base}: {size} ({sample}). {doubt}"
 
 
 def _ends(change: Difference) -> list[str]:

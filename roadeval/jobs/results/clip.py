@@ -54,9 +54,9 @@ def clip(
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
     if not scenes or (form and len(scenes) > 1):
-        one = "a file holds one clip: name a folder"
+        one_clip = "a file holds one clip: name a folder"
         none = "no pictures of such frames were kept; --record keeps some, and in a fleet --keep"
-        raise RoadevalError(one if scenes else none, where=place if scenes else result)
+        raise RoadevalError(one_clip if scenes else none, where=place if scenes else result)
     # The colour matrix is stated, because a player would guess it from the size. x264's tree of
     # macroblocks is off: with it (build 165, AVX-512) one encoding in a hundred of equal pictures
     # has other bytes.
@@ -112,7 +112,7 @@ def _film(
     span_s = (recording.stamps[frames[-1]] - recording.stamps[frames[0]]) / 1e9
     rate = min(max((len(frames) - 1) / max(span_s, 0.001), 2), 30)
     speed = f"{span_s * rate / (len(frames) - 1):.1f}" if span_s > 0 else "1.0"
-    about = drive.title if speed == "1.0" else f"{drive.title}, {speed} x speed"
+    title = drive.title if speed == "1.0" else f"{drive.title}, {speed} x speed"
 
     def picture(frame: int) -> Rgb:
         next(steps)
@@ -121,17 +121,17 @@ def _film(
             panel, rates = picker.outcome(recording, name, frame), rates_of.get((frame, name), {})
             numbers = ", ".join(f"{rate} {percent(value)} %" for rate, value in rates.items())
             panels.append(replace(panel, title=f"frame {frame}, {name}: {numbers or 'not scored'}"))
-        return clip_picture(panels, drive.truth(frame), about)
+        return clip_picture(panels, drive.truth(frame), title)
 
     return Fraction(round(100 * rate), 100), map(picture, frames)
 
 
 def _write_log(drive: DriveResult, frames: Sequence[int], path: Path) -> tuple[str, ...]:
     """Write the log's own messages of frames; return the losses of the log."""
-    if (about := drive.facts.log) is None:
+    if (log_facts := drive.facts.log) is None:
         raise RoadevalError("a partial recording, which names no log", where=drive.path)
-    with open_log(open_source(about.path), every_topic=True) as log:
-        if log.digest != about.digest:
-            raise RoadevalError("another log than that of this result", where=about.path)
+    with open_log(open_source(log_facts.path), every_topic=True) as log:
+        if log.digest != log_facts.digest:
+            raise RoadevalError("another log than that of this result", where=log_facts.path)
         log.write_excerpt(str(drive.properties["image_topic"]), frames[0], frames[-1], path)
         return log.losses

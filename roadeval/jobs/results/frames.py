@@ -115,8 +115,8 @@ class FramePicker:
         if self._focus is None:
             unlabelled = self._result.facts.unlabelled
             look_at = unlabelled.look_at if unlabelled else []
-            there = [frame for frame in look_at if frame in self._result.pictured]
-            return [*map(self._pictured, there[:WORST])]
+            pictured = [frame for frame in look_at if frame in self._result.pictured]
+            return [*map(self._pictured, pictured[:WORST])]
         focus_masks = only(self._finals, variant=self._focus)
         rows = tables.worst(focus_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
         rows = rows[rows[TESTED] >= focus_masks[TESTED].mean()]
@@ -134,22 +134,22 @@ class FramePicker:
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
         """Return a frame with its pictures; pictures of layers are at most so many pixels wide."""
-        made = self._pictured(frame)
-        above = [*self._from_above(made)]
-        made = replace(made, layers=[*made.layers, *([above] if above else [])])
-        return strip(made, self._all, self._result.inspect(frame), layers)
+        notable = self._pictured(frame)
+        above = [*self._from_above(notable)]
+        notable = replace(notable, layers=[*notable.layers, *([above] if above else [])])
+        return strip(notable, self._all, self._result.inspect(frame), layers)
 
-    def _from_above(self, made: NotableFrame) -> Iterator[LayerImage]:
+    def _from_above(self, notable: NotableFrame) -> Iterator[LayerImage]:
         """Yield camera, truth and errors of a frame as seen from above, if the ground is known."""
         facts = self._result.facts
         if (ground := facts.drive.ground) is None:
             return
         plan = Plan(ground, *facts.evaluation.plan, facts.evaluation.plan_width, CELL)
-        for layer in made.images:
+        for layer in notable.images:
             if layer.image.shape[:2] == (ground.height, ground.width):
-                seen = None if layer.array is None else plan.picture(layer.array, IGNORE)
+                picture = None if layer.array is None else plan.picture(layer.array, IGNORE)
                 title = f"from above: {layer.title.replace(': ', ', ')}"
-                yield LayerImage(title, plan.picture(layer.image), layer.spec, seen)
+                yield LayerImage(title, plan.picture(layer.image), layer.spec, picture)
 
     def _pictured(self, frame: int) -> NotableFrame:
         assert self._recording is not None
@@ -159,13 +159,13 @@ class FramePicker:
         self, frame: int, stamp_ns: int, change: float | None = None, variant: str | None = None
     ) -> NotableFrame:
         """Return a frame of a variant, by default the focus, with its pictures if there are any."""
-        result, seen = self._result, self._recording
+        result, recording = self._result, self._recording
         if frame not in result.pictured:
-            seen = None
-        layers = [*self._layers(seen, frame)] if seen and change is None else []
+            recording = None
+        layers = [*self._layers(recording, frame)] if recording and change is None else []
         if (variant := variant or self._focus) is None or frame not in self._scored:
-            assert seen is not None
-            images = [LayerImage("camera", seen.image(frame))]
+            assert recording is not None
+            images = [LayerImage("camera", recording.image(frame))]
             return NotableFrame(frame, stamp_ns, "", {}, images=images, layers=layers)
         masks = only(self._finals, frame=frame).set_index("variant")
         rates: dict[Any, Any] = masks[[*SHORT]].to_dict("index")
@@ -173,7 +173,7 @@ class FramePicker:
             *(frame, stamp_ns, variant, rates),
             change=change,
             notes=[*notes(rates, variant)],
-            images=[*self._outcomes_of(seen, frame)] if seen else [],
+            images=[*self._outcomes_of(recording, frame)] if recording else [],
             layers=layers,
         )
 

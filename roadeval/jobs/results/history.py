@@ -212,14 +212,14 @@ def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path,
     if len(paths) < 2:
         return (paths or [place])[0], ()
     try:
-        made = history(paths, on_progress=on_progress)
+        past = history(paths, on_progress=on_progress)
     except TooFewRunsError as error:
         if not error.runs:
             raise RoadevalError(
                 "no run of it can be read", where=place, remedy=error.remedy
             ) from error
         return Path(error.runs[0].paths[0]), error.lost
-    return Path(made.last_good.paths[0]), made.lost
+    return Path(past.last_good.paths[0]), past.lost
 
 
 def _runs_in_order(
@@ -320,18 +320,18 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     of_classes["kind"] = kinds[np.full(len(classes), 2)]
     of_masks = scores.assign(part=scores["region"], road=scores["TP"] + scores["FN"])
     of_masks["kind"] = kinds[(scores["region"] != ALL).to_numpy(int)]
-    about = drives[[*RUN_KEY, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
-    about = about.merge(
+    logs = drives[[*RUN_KEY, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
+    logs = logs.merge(
         only(scores, region=ALL)[[*RUN_KEY, "truth"]].drop_duplicates(RUN_KEY), on=RUN_KEY
     )
     for other in ("log_digest", "drive"):
-        about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
-    about["group"] = about["group"].astype("category")
+        logs["group"] = logs["group"].astype(object).fillna(logs[other].astype(object))
+    logs["group"] = logs["group"].astype("category")
     columns = [*RUN_KEY, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
     # If the categories differ, a merge turns them into texts.
-    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
+    rows = rows.merge(logs.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
     return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
 
@@ -381,23 +381,23 @@ def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
     with suppress(RoadevalError):  # one of several results may be damaged
         drives = {drive.key: drive for drive in before.compared}
         parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
-    named = [
+    stated = [
         {f"label {name}": value for name, value in run.origin.labels.items()}
         | (facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version})
         for run, facts in ((old, before.facts), (new, after.facts))
     ]
-    parts |= {name: (named[0].get(name), value) for name, value in named[1].items()}
+    parts |= {name: (stated[0].get(name), value) for name, value in stated[1].items()}
     yield from (f"{k} {setting(a)} to {setting(b)}" for k, (a, b) in parts.items() if a != b)
     had, has = (~np.isnan(line.drive_rates[place]) for place in places)
     names = line.drives["drive"].to_numpy()
-    came, gone, same = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
-    for title, which in (
-        ("new drives", came - gone),
-        ("drives that are gone", gone - came),
-        ("drives with other frames or another truth", (came & gone) - same),
+    added, removed, common = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
+    for title, drive_names in (
+        ("new drives", added - removed),
+        ("drives that are gone", removed - added),
+        ("drives with other frames or another truth", (added & removed) - common),
     ):
-        if which:
-            yield f"{title}: {first_of(sorted(which), DRIVES)}"
+        if drive_names:
+            yield f"{title}: {first_of(sorted(drive_names), DRIVES)}"
 
 
 def write(history: History, path: Path) -> Path:

@@ -101,9 +101,9 @@ def rank_frames(
     by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
         return []
-    apart = tables.scene_ns(rows["stamp_ns"])
+    scene_length_ns = tables.scene_ns(rows["stamp_ns"])
     looked_at = masks if among is None else masks[masks["frame"].isin([*among])]
-    ranked = tables.worst(looked_at, count, by, apart)
+    ranked = tables.worst(looked_at, count, by, scene_length_ns)
     parts: dict[Any, Any] = {}
     rates_of: dict[Any, Any] = {}
     if by == TESTED:

@@ -80,8 +80,8 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
         for stage in stages:
             rows = only(levels, variant=variant, stage=stage)
             best, settings = facts.thresholds.get(variant, {}), facts.settings.get(variant, {})
-            now = settings.get(stage, {}).get("threshold", best.get("own"))
-            if now is None or not len(rows):
+            used = settings.get(stage, {}).get("threshold", best.get("own"))
+            if used is None or not len(rows):
                 continue
             by_level = np.zeros((2, LEVELS), np.int64)
             by_level[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
@@ -92,7 +92,7 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
                 line = f"# for --net {variant}={variant}.toml\nfile = {network}\n{line}"
             elif is_own:
                 line = f"# in the settings of {variant}\n[{stage}]\n{line}"
-            yield ThresholdSlider(variant, stage, now, line, counts, by_level, reached=not is_own)
+            yield ThresholdSlider(variant, stage, used, line, counts, by_level, reached=not is_own)
 
 
 def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> film.Film | None:
@@ -104,8 +104,8 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
     if recording is None or not result.pictured or room < FILM_BYTES:
         return None
     scored = {*result.rows["frame"]}
-    there = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
-    chosen = sorted({*evenly(there, FILMED), *_choose_frames(result, PICTURED)})
+    pictured = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
+    frames = sorted({*evenly(pictured, FILMED), *_choose_frames(result, PICTURED)})
     finals_of = {variant.name: variant.stages[-1] for variant in recording.variants}
     layers = {
         variant.name: {spec.name for spec in variant.layers} for variant in recording.variants
@@ -118,7 +118,7 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
     ]
 
     def read(frame: int) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
-        on_progress(Progress(bisect_right(chosen, frame), len(chosen), "filming"))
+        on_progress(Progress(bisect_right(frames, frame), len(frames), "filming"))
         yield film.CAMERA, recording.image(frame)
         if frame in scored:
             yield film.TRUTH_PANEL, film.shade_truth(recording.truth(frame))
@@ -130,10 +130,10 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
                 yield film.PROBABILITY.format(name), (probability * 255).astype(np.uint8)
 
     while True:
-        made = film.make_film(chosen, panels, lambda frame: dict(read(frame)), room)
-        if len(made.content) <= room or len(chosen) < 2:
-            return made
-        chosen = chosen[::2]
+        film_file = film.make_film(frames, panels, lambda frame: dict(read(frame)), room)
+        if len(film_file.content) <= room or len(frames) < 2:
+            return film_file
+        frames = frames[::2]
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
@@ -143,16 +143,16 @@ def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) 
     """
     if result.recording is None:
         return []
-    chosen = _choose_frames(result, PICTURED)
+    frames = _choose_frames(result, PICTURED)
     picker, strips = FramePicker(result, None, None), []
-    for done, frame in enumerate(chosen, 1):
-        made = picker.strip(frame)
+    for done, frame in enumerate(frames, 1):
+        pictures = picker.strip(frame)
         # A page holds a picture as a text, and has words around it.
-        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+        room -= sum(len(image.content) * 4 // 3 + 400 for image in pictures.images())
         if room < 0:
             break
-        strips.append(made)
-        on_progress(Progress(done, len(chosen), "reading"))
+        strips.append(pictures)
+        on_progress(Progress(done, len(frames), "reading"))
     return sorted(strips, key=lambda strip: strip.frame)
 
 
@@ -160,8 +160,8 @@ def _choose_frames(result: DriveResult, count: int) -> list[int]:
     """Return the frames to show: first the worst of the focus, then others, evenly spread."""
     rows = result.rows
     scored_frames = {*rows["frame"]}
-    there = [number for number in result.pictured if number in scored_frames]
-    pictured = there or [*result.pictured]
+    pictured_frames = [number for number in result.pictured if number in scored_frames]
+    pictured = pictured_frames or [*result.pictured]
     focus = result.facts.focus
     spread = evenly(pictured, count)
     if focus is None:

@@ -128,15 +128,15 @@ def open_drives(
 
     drives = []
     masks = config.override({"output": {"record": "masks", "figures": False}})
-    for number, path in enumerate(part for one in sources for part in find_recordings(Path(one))):
-        made, run = path, None
+    for number, path in enumerate(part for name in sources for part in find_recordings(Path(name))):
+        file, run = path, None
         if path.suffix != ".rrd":
-            made, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
-            replay(path, masks, save=made, reports=Path(place, "reports"), on_progress=on_progress)
-        drive = Result(made).drive
+            file, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
+            replay(path, masks, save=file, reports=Path(place, "reports"), on_progress=on_progress)
+        drive = Result(file).drive
         if drive is None or drive.recording is None:
             raise RoadevalError(
-                f"{made}: this command takes a recording of one camera; give the log, and "
+                f"{file}: this command takes a recording of one camera; give the log, and "
                 "of several cameras one with --image-topic"
             )
         drives.append((path, drive, run))
@@ -192,8 +192,8 @@ def _pick_frames(
     picks_before = _begin_picks(drive, folder, doubts, source, seed)
     scores = picks_before.every_score()
     if (sign := sign_of(doubts)) is not None:  # the present doubt replaces the earlier one
-        now = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
-        scores = np.array([now.get(float(stamp), np.nan) for stamp in picks_before.stamps])
+        doubt_of = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
+        scores = np.array([doubt_of.get(float(stamp), np.nan) for stamp in picks_before.stamps])
     taken = [picks_before.places[stamp] for stamp in picks_before.by_stamp]
     stamps = np.array(picks_before.stamps, np.int64)
     places = choose_frames(
@@ -229,12 +229,12 @@ def _begin_picks(
             raise RoadevalError(f"{folder}: {problem}")
         return picks
     # Files that a killed run has left are written again.
-    left = {*folder.rglob("*")} if folder.exists() else set()
+    leftovers = {*folder.rglob("*")} if folder.exists() else set()
     begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
-    begun |= {file for file in left if re.fullmatch(r"\d{19}\.png", file.name)}
-    proposed = {file for file in left if folder / PROPOSALS in file.parents}
-    labels = {file for file in left if folder / LABELS in file.parents}
-    if labels or left - begun - proposed:
+    begun |= {file for file in leftovers if re.fullmatch(r"\d{19}\.png", file.name)}
+    proposed = {file for file in leftovers if folder / PROPOSALS in file.parents}
+    labels = {file for file in leftovers if folder / LABELS in file.parents}
+    if labels or leftovers - begun - proposed:
         raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
     stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
     if len({*stamps}) < len(stamps):
@@ -311,6 +311,6 @@ def _add_picks(
         if float(stamp := picks.stamps[place]) not in picks.by_stamp:
             why, chance = (Why.RANDOM, probability) if place in random else (Why.RANKED, None)
             frame = picks.frames[place]
-            about = why, chance, picks.scores[place], proposals[frame], wave
-            new.append(Picked(frame, stamp, *about))
+            details = why, chance, picks.scores[place], proposals[frame], wave
+            new.append(Picked(frame, stamp, *details))
     return replace(picks, drawn=drawn, picked=[*old, *new]), new

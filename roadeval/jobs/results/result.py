@@ -361,8 +361,8 @@ class Result:
     @property
     def fleet(self) -> FleetFolder | None:
         """The fleet's folder, if a single fleet was opened."""
-        (first, *more) = self._opened
-        return first if isinstance(first, FleetFolder) and not more else None
+        (first, *others) = self._opened
+        return first if isinstance(first, FleetFolder) and not others else None
 
     @property
     def drive(self) -> DriveResult | None:
@@ -508,14 +508,14 @@ def input_digests(facts: Facts) -> dict[str, str]:
     """Return the digests of what a run took from files, by names such as ``masks mine``."""
     digests = {}
     for variant, stages in facts.methods.items():
-        for about in filter(lambda stage: isinstance(stage, Mapping), stages.values()):
-            name = f"code of {variant} ({about.get('stage')})"
-            digests[name] = _short_digest(about, "sha256")
+        for description in filter(lambda stage: isinstance(stage, Mapping), stages.values()):
+            name = f"code of {variant} ({description.get('stage')})"
+            digests[name] = _short_digest(description, "sha256")
     for variant in facts.settings:
         digests[f"network {variant}"] = _short_digest(facts.settings, variant, "net", "sha256")
     for name in facts.masks:
-        shown = name if name == "truth" else f"masks {name}"
-        digests[shown] = _short_digest(facts.masks, name, "sha256")
+        label = name if name == "truth" else f"masks {name}"
+        digests[label] = _short_digest(facts.masks, name, "sha256")
     return {name: digest for name, digest in digests.items() if digest}
 
 

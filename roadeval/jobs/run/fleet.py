@@ -107,11 +107,11 @@ def replay_fleet(
     run.replay_all()
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
-    asked = {drive: done.asked for drive, done in run.done.items()}
+    asked_digests = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    how = config.evaluation, config.as_dict(), text
+    settings = config.evaluation, config.as_dict(), text
     origin = Origin(time.time_ns(), *commit, {**config.output.labels})
-    facts = writer.finish(members, *how, asked=asked, origin=origin)
+    facts = writer.finish(members, *settings, asked=asked_digests, origin=origin)
     counts = Counter(drive.status for drive in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not drive.repeated for drive in run.done.values())
@@ -198,15 +198,15 @@ class FleetRun:
             training.append(fleet_work.FoldTask(self.folder, *about))
         self.show("training")
         futures = [engine.submit(fleet_work.train_fold, task) for task in training]
-        made, tasks = [], []
+        models, tasks = [], []
         for fold, future in enumerate(futures):
             try:
-                made.append(future.result())
+                models.append(future.result())
             except Exception as error:  # only the fold's drives fail
                 problem = self._reason(error, f"the model of fold {fold} was trained")
-                made.append(fleet_work.FoldModel(fold, "", problem))
+                models.append(fleet_work.FoldModel(fold, "", problem))
         for entry in self.entries:
-            model = made[folds[entry.id]]
+            model = models[folds[entry.id]]
             path = str(training[model.fold].path)
             config = configs[entry.id].override({"training": {"model": path}})
             how = software(config), model.sha256, model.fold

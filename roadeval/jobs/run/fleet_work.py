@@ -202,10 +202,10 @@ def _try_replay(task: DriveTask) -> Made:
         packed=True,
         without=task.config.output.without,
     )
-    alone = replace(task.config.run, jobs=1)
+    one_process = replace(task.config.run, jobs=1)
     pictures = WorstPictures(task.focus)
     try:
-        config = replace(task.config, output=output, run=alone, fleet=FleetSettings())
+        config = replace(task.config, output=output, run=one_process, fleet=FleetSettings())
         outcome = replay(task.entry.source, config, on_frame=pictures.offer)
         _remove(task, PICTURES, *CACHED, *([RECORDINGS] if record == "none" else []))
         for _, frame, _, picture in pictures.worst:
@@ -313,21 +313,21 @@ def train_fold(task: FoldTask) -> FoldModel:
     `FleetError` if the fleet's disk fails, or the worker has other software.
     """
     _check_software(task.software, task.config)
-    about = task.path.with_suffix(".json")
-    with ending_the_run(task.folder), claim_files(task.path, about):
+    facts_file = task.path.with_suffix(".json")
+    with ending_the_run(task.folder), claim_files(task.path, facts_file):
         looks = [stamp_files(entry, config.for_training()) for entry, config in task.candidates]
         parts = [settings_digest(task.config, ""), looks]
         parts += [[entry.id, settings_digest(config, "")] for entry, config in task.candidates]
         digest = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
         with suppress(OSError, ValueError):
-            trained = read_json(read_bounded(about))
+            trained = read_json(read_bounded(facts_file))
             as_asked = {"asked": digest, "sha256": sha256_of(task.path)}
             if isinstance(trained, dict) and as_asked.items() <= trained.items():
                 return FoldModel(task.fold, as_asked["sha256"])
-        return _train_model(task, about, digest)
+        return _train_model(task, facts_file, digest)
 
 
-def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
+def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> FoldModel:
     """Train on enough drives; the file beside the model says why others gave no frames."""
     held = HeldFrames()
     drawn: dict[Path, Sequence[Frame]] = {}
@@ -365,7 +365,7 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
         "passed_by": passed,
         "training_frames": sorted(model.digests),
     }
-    put(about, json_text(about_model).encode())
+    put(facts_file, json_text(about_model).encode())
     return FoldModel(task.fold, digest)
 
 
@@ -389,13 +389,13 @@ class WorstPictures:
         if variant is None or not errors or math.isnan(error := errors[-1]):
             return
         near = [rival for rival in self.worst if abs(rival[2] - frame.stamp_ns) < APART_NS]
-        rest = [rival for rival in self.worst if rival not in near]
-        rivals = [*near, *(rest[-1:] if len(rest) == OF_A_DRIVE else [])]
+        others = [rival for rival in self.worst if rival not in near]
+        rivals = [*near, *(others[-1:] if len(others) == OF_A_DRIVE else [])]
         if any(rival[0] >= error for rival in rivals):
             return
         # Pictures are painted at a small size, because worse frames soon replace most of them.
         image, errors_of = shrink(frame.image, WIDTH), result.errors[variant].array
         small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
-        ranked = [*rest, (error, frame.number, frame.stamp_ns, picture)]
+        ranked = [*others, (error, frame.number, frame.stamp_ns, picture)]
         self.worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:OF_A_DRIVE]

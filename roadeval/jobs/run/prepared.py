@@ -233,7 +233,7 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     is what the camera is called in a rig.
     """
     selection = log.select()
-    again = partial(log.frames, selection)
+    read_frames = partial(log.frames, selection)
     variants = config.variants()
     picks = Picks.of_labels(Path(config.truth.path)) if config.truth.path else None
     if picks and selection.truth and isinstance(selection.truth.pictures, NamedLabels):
@@ -241,14 +241,14 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     if picks and config.frames.scale != 1:
         raise RoadevalError("does not go with picked frames", setting="frames.scale")
     labelled = selection.truth is not None
-    stream = again()
+    stream = read_frames()
     frames = len(stream)
     truths = frames if selection.truth is None else len(selection.truth.pictures)
     if frames > SPARSE * truths and picks is None:
         note = "at most {} of {} frames have road truth: {frames.labelled} reads these alone"
         on_progress(Progress(0, None, "opening", Sentence(note, truths, frames)))
     model, schedule = _learn(
-        again, variants, config.training, on_progress, labelled=labelled, picks=picks
+        read_frames, variants, config.training, on_progress, labelled=labelled, picks=picks
     )
     try:
         chains = bind(variants, model)
