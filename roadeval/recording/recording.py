@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike
@@ -142,14 +143,15 @@ class Recording:
         """The rows of ``frames.csv``."""
         return self.table("frames")
 
-    def table(self, name: str) -> pd.DataFrame:
-        """Return the rows of a table by its name, such as ``oracles``; empty if it has none."""
+    def table(self, name: str, masks: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
+        """Return the rows of a table by its name, of some masks or of all; empty if it has none."""
         if name in self.layout.tables:
             lines = (line for _, line in self._file.rows(f"/results/{name}", TEXT))
             text = "".join((self.layout.tables[name].rstrip(), "\n", *lines))
         else:
             text = self.result(name) or ""
-        return read_table(name, text, self.facts.tables or None if self.facts else None)
+        stated = self.facts.tables or None if self.facts else None
+        return read_table(name, text, stated, masks=masks)
 
     def scalars(self, path: str) -> pd.Series[float]:
         """Return numbers by frame under an entity path, such as ``/timing/filtered/svm``."""

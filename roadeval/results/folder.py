@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from functools import partial
@@ -159,12 +159,12 @@ class ResultsFolder:
         self._facts_of_all = Facts.read(folder / SUMMARY)
         self.facts = self._facts_of_all.cameras[camera] if camera else self._facts_of_all
 
-    def table(self, name: str) -> pd.DataFrame:
-        """Read a table by its name in `roadeval.results.schema.TABLES`.
+    def table(self, name: str, masks: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
+        """Read a table by its name in `roadeval.results.schema.TABLES`, of some masks or of all.
 
         A table that was not written is empty. A `ResultsError` if it is damaged, or not the one
         that the summary states.
         """
         packed = f"{name}{PACKED}"
         path = self._folder / (packed if packed in self._facts_of_all.files else f"{name}{CSV}")
-        return read_table(name, path, self._facts_of_all.tables, self._camera)
+        return read_table(name, path, self._facts_of_all.tables, self._camera, masks)

@@ -37,11 +37,11 @@ def describe_suspect(suspect: Mapping[str, Any]) -> str:
 def describe_suspects(suspects: pd.DataFrame) -> str:
     """Return a sentence on the frames with clearly wrong labels, from the ranked suspects."""
     frames = sorted(suspects[suspects["clear"]]["frame"].tolist())
-    if not frames:
-        return "No label is clearly wrong."
-    many = f"The labels of {len(frames)} frames look"
-    looks = many if len(frames) > 1 else "The label of 1 frame looks"
-    return f"{looks} wrong: {first_of([*map(str, frames)], 10)}."
+    if len(frames) < 2:
+        is_wrong = f"The label of frame {frames[0]} looks wrong." if frames else ""
+        return is_wrong or "No label is clearly wrong."
+    named = first_of([*map(str, frames)], 10)
+    return f"The labels of {len(frames)} frames look wrong: {named}."
 
 
 def describe_annotator(name: str, share: float, frames: int) -> str:

@@ -15,8 +15,16 @@ from roadeval.evaluation.score.degradation import Degradation, Degradations, as_
 from roadeval.evaluation.score.scoreboard import Effect, correct_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.difference import LEAST_GROUPS, over_drives, strata
-from roadeval.evaluation.stats.slices import Slice, find_slices
-from roadeval.evaluation.tables import COUNTS, MASK, finals, group_rows, only, rates_of
+from roadeval.evaluation.stats.slices import OF_REGIONS, Slice, find_slices
+from roadeval.evaluation.tables import (
+    COUNTS,
+    MASK,
+    concatenate,
+    finals,
+    group_rows,
+    only,
+    rates_of,
+)
 from roadeval.results.facts import FleetFacts, Member, StratumFacts, Totals
 from roadeval.results.rows import records
 from roadeval.results.schema import FAILED, TAG
@@ -136,7 +144,8 @@ def slices_over_drives(
     scored = drives["drive"][drives["evaluated"].fillna(0) > 0].tolist()
     if len({groups[drive] for drive in scored}) < 2 * LEAST_GROUPS:
         return {}
-    conditions, frames, parts = (read(name, scored) for name in ("conditions", "frames", "regions"))
+    names = ("conditions", "frames", "regions", "parts")
+    conditions, frames, regions, parts = (read(name, scored) for name in names)
     if not len(conditions):  # older results lack them
         return {}
     stamps = conditions["stamp_ns"]
@@ -149,8 +158,9 @@ def slices_over_drives(
     ).astype({"drive": "str"})
     tags = drives.filter(regex=f"^(drive$|{TAG})").astype({"drive": "str"})
     conditions = conditions.merge(tags, on="drive")
-    parts = parts.assign(wrong=parts["FP"] + parts["FN"])
-    parts = parts[parts["region"].astype("str").str.match(r"band_|\d")]
+    regions = regions.assign(wrong=regions["FP"] + regions["FN"])
+    regions = regions[regions["region"].astype("str").str.match(OF_REGIONS)]
+    parts = concatenate([regions[[*parts]], parts])
     return {
         variant: find_slices(
             rows, conditions, only(parts, variant=variant), confidence, over_drives=True

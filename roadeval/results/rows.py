@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data import Doubt, Frame, FrameResult, Tally, TruthClass
+from roadeval.data import BASELINE, Doubt, Frame, FrameResult, Tally, TruthClass
 from roadeval.evaluation.regions import ALL
 from roadeval.evaluation.score.thresholds import at_levels
 from roadeval.evaluation.score.unlabelled import SIGNS
+from roadeval.evaluation.stats.slices import OF_REGIONS
 from roadeval.evaluation.tables import KEY, MASK, concatenate, group_rows, is_final, totals
 from roadeval.images.disturbing import Disturbance
 from roadeval.results.schema import DAMAGED, SCORED, TABLES, TAG, TYPES, UNSCORED
@@ -124,12 +125,16 @@ def sum_rows(
         levels = (other + road).nonzero()[0]
         columns = np.column_stack((levels, road[levels], other[levels]))
         probabilities += [(*name, *row) for row in columns.tolist()]
+    parts = board.parts(classes)
+    is_region = parts["region"].str.match(OF_REGIONS)
+    parts = parts[~is_region.astype(bool) & (parts["variant"] != BASELINE)]
     return {
         "windows": [*windows.drop(columns=KEY).itertuples(index=False, name=None)],
         "changes": [(*step, *change) for step, change in board.changes.items()],
         "heat": heat,
         "probabilities": probabilities,
         "classes": [*board.classes.rows(classes)],
+        "parts": [*parts.sort_values("frame", kind="stable").itertuples(index=False, name=None)],
         "metres": [tuple(row.values()) for row in board.metres()],
     }
 

@@ -247,6 +247,13 @@ _OF_SUMS: Final[dict[str, tuple[Column, ...]]] = {
         Column("frames", Kind.COUNT, "evaluated frames that have the class"),
         Column("worst", Kind.TEXT, "frames with most of its false or missed road, a second apart"),
     ),
+    "parts": (
+        *_IN_FRAME,
+        _VARIANT,
+        Column("region", Kind.TEXT, "`left` or `right` half, or `on` a class of the truth"),
+        Column("wrong", Kind.COUNT, "labelled pixels that the final mask has wrong", "pixels"),
+        _LABELLED,
+    ),
     "metres": (
         *KEY,
         _VARIANT,
@@ -353,6 +360,7 @@ _ROWS: Final = {
     "heat": "A row per variant and cell with an error or a missing label, and for the last cell.",
     "probabilities": "A row per variant, stage and level of its road probability, for curves.",
     "classes": "A row per final mask and class of the truth, where the truth has classes.",
+    "parts": "A row per evaluated frame, final mask and part of the image that has no region.",
     "metres": "A row per final mask and measure on the ground; the page on metres explains them.",
     "drives": "A row per drive and camera, scored or not; a column `tag_<key>` for each tag.",
     "scores": "A row per drive, camera, variant, stage and region.",

@@ -62,7 +62,11 @@ class TableFacts:
 
 
 def read_table(
-    name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None, camera: str = ""
+    name: str,
+    source: Path | str,
+    stated: Mapping[str, TableFacts] | None = None,
+    camera: str = "",
+    masks: Collection[tuple[str, str]] | None = None,
 ) -> pd.DataFrame:
     """Read a table of a drive bit-exactly, and check that it is complete.
 
@@ -70,9 +74,10 @@ def read_table(
     compressed with gzip, or its text with the header line. A file that does not exist has no rows,
     like an empty text. ``stated`` are the facts that the summary states of each table, by name: a
     table that it does not state must be empty. It is None if there is no summary. With ``camera``
-    only the rows of that camera are returned. Names are categoricals of text, even if they look
-    like numbers; rates are float64, all other numbers int64. A `ResultsError` if the table is
-    damaged, or not the one that is stated.
+    only the rows of that camera are returned, and with ``masks`` only rows of these variants and
+    stages; other rows take no memory. Names are categoricals of text, even if they look like
+    numbers; rates are float64, all other numbers int64. A `ResultsError` if the table is damaged,
+    or not the one that is stated.
     """
     import pyarrow as pa
 
@@ -97,7 +102,7 @@ def read_table(
                 raise ValueError("a row is there twice")
             # The file was read to its end. If the end is its beginning, the file has no header.
             content = file if file.tell() else BytesIO(table.header.encode())
-            parsed = _parse_csv(content, table)
+            parsed = _parse_csv(content, table, masks)
             # Arrow frees each column as soon as pandas has it. A column of one chunk would become a
             # view, and nobody can write to a view.
             rows: pd.DataFrame = parsed.to_pandas(
@@ -143,10 +148,12 @@ def _check_stated(where: Path | str, file: BinaryIO, stated: TableFacts | None) 
     raise ResultsError(f"{where}: does not agree with its summary ({difference}); {_ANEW}")
 
 
-def _parse_csv(file: BinaryIO, table: TableSchema) -> pa.Table:
-    """Parse CSV and check it; a ValueError tells what is wrong with it."""
+def _parse_csv(
+    file: BinaryIO, table: TableSchema, masks: Collection[tuple[str, str]] | None
+) -> pa.Table:
+    """Parse CSV, and check the rows of these masks, or all; a ValueError tells what is wrong."""
     import pyarrow as pa
-    from pyarrow import csv
+    from pyarrow import compute, csv
 
     words = pa.dictionary(pa.int32(), pa.string())  # each distinct word is held once
     types = [(c.name, words if c.is_word else TYPES[c.kind]) for c in table.columns]
@@ -154,7 +161,15 @@ def _parse_csv(file: BinaryIO, table: TableSchema) -> pa.Table:
     file.seek(-1, os.SEEK_END)
     has_end = file.read() == b"\n"
     file.seek(0)
-    parsed = csv.read_csv(file, convert_options=options)
+    if masks is None:
+        parsed = csv.read_csv(file, convert_options=options)
+    else:
+        is_chosen = compute.scalar(False)
+        for variant, stage in masks:
+            is_chosen |= (compute.field("variant") == variant) & (compute.field("stage") == stage)
+        with csv.open_csv(file, convert_options=options) as blocks:
+            chosen = (pa.Table.from_batches([block]).filter(is_chosen) for block in blocks)
+            parsed = pa.concat_tables([blocks.schema.empty_table(), *chosen])
     if not has_end:
         raise ValueError("its last line is cut off")
     complete = [c.name for c in table.columns if c.kind not in (Kind.RATE, Kind.NUMBER)]

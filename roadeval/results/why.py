@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Final
 
@@ -37,6 +38,17 @@ def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[
     variants = (name for name in facts.finals if name != BASELINE)
     by_variant = {name: [*islice(_reasons(facts, classes, name), MOST)] for name in variants}
     return {name: reasons for name, reasons in by_variant.items() if reasons}
+
+
+def with_doubts(facts: Facts, sentences: Sequence[str]) -> Facts:
+    """Return facts with sentences on the labels before the reasons of each variant.
+
+    Doubts about the truth come first, as all other reasons rest on it; at most `MOST` are kept.
+    """
+    doubts = [Reason(sentence, []) for sentence in sentences]
+    variants = (name for name in facts.finals if name != BASELINE)
+    why = {name: [*doubts, *facts.why.get(name, [])][:MOST] for name in variants}
+    return replace(facts, why=why) if doubts else facts
 
 
 def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> Iterator[Reason]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 from pathlib import Path
@@ -18,6 +19,7 @@ from tests.evaluation.test_fit import image_at, method_at, wrong_labels
 from tests.evaluation.test_fit import road_ahead as road_at
 from tests.fixtures.logged import coco_of, write_drive
 from tests.jobs.making import settings, write_log
+from tests.report.making import text
 
 NS = 100_000_000
 IGNORED = slice(0, 10)
@@ -132,6 +134,35 @@ def test_how_far_two_people_differ_is_told(audited) -> None:
     said = audited[0].sentences[-1]
     assert said.startswith("b and the truth differ on ")
     assert said.endswith("differences of ERR below that mean nothing.")
+
+
+@pytest.mark.parametrize("form", ["html", "pdf"])
+def test_a_report_begins_its_reasons_with_what_an_audit_says(audited, place, tmp_path, form):
+    found, folder = audited
+    report = roadeval.write_report(
+        place / "drive.rrd", tmp_path / f"report.{form}", audit=folder, focus="mine"
+    )
+    told = text(report.read_bytes()) if form == "pdf" else html.unescape(report.read_text())
+    told = told.replace("\N{NO-BREAK SPACE}", " ")
+    places = [told.index(words) for words in ("Why mine errs", *found.doubts)]
+    assert len(places) == 3
+    assert places == sorted(places)
+
+
+def test_a_report_takes_no_audit_of_another_drive(audited, place, tmp_path) -> None:
+    other = Path(shutil.copytree(audited[1], tmp_path / "other"), "audit.json")
+    about = json.loads(other.read_text())
+    for wrong, problem in (
+        (about | {"drive": "x"}, r"audit\.json: is of x /camera, not of drive"),
+        (about | {"sentences": "x"}, r"audit\.json: damaged"),
+        ({}, r"audit\.json: damaged"),
+    ):
+        other.write_text(json.dumps(wrong))
+        with pytest.raises(RoadevalError, match=problem):
+            roadeval.write_report(place / "drive.rrd", tmp_path / "r.pdf", audit=other.parent)
+    with pytest.raises(RoadevalError, match=r"is no folder of roadeval audit"):
+        roadeval.write_report(place / "drive.rrd", tmp_path / "r.pdf", audit=tmp_path)
+    assert not (tmp_path / "r.pdf").exists()
 
 
 def test_corrected_labels_change_these_frames_and_no_others(

@@ -166,6 +166,17 @@ def test_a_recording_and_the_folder_beside_it_hold_the_same(made):
         pd.testing.assert_frame_equal(one, other)
 
 
+@pytest.mark.parametrize("table", ["frames", "regions"])
+@pytest.mark.parametrize("kind", ["alone", "recording", "many"])
+def test_the_rows_of_final_masks_are_those_of_the_whole_table(made, kind, table):
+    result = roadeval.Result(getattr(made, kind))
+    whole = result.table(table)
+    expected = whole[whole["stage"] == "post"].reset_index(drop=True)
+    assert len(expected)
+    rows = result.table(table, final=True).reset_index(drop=True)
+    pd.testing.assert_frame_equal(rows, expected, check_categorical=False)
+
+
 def test_several_results_are_one_table_with_their_drives(made):
     both = roadeval.Result(made.alone, made.many)
     assert len({*both.scores["drive"]}) == len(both.compared) == len(both.drives) == 2

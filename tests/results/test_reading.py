@@ -67,6 +67,21 @@ def test_of_several_cameras_one_can_be_read():
     assert len(read_table("oracles", text)) == 2
 
 
+def test_of_some_masks_alone_the_rows_are_the_same():
+    variants = ("net", "plain", "blind", "other")
+    lines = [line(frame, variants[frame % 4], frame) for frame in range(20_000)]  # 2 blocks
+    text = HEADER + "".join(lines).replace("svm,post,7,", "svm,similarity,7,")
+    whole = read_table("oracles", text)
+    masks = [("net", "post"), ("blind", "post"), ("other", "similarity"), ("gone", "post")]
+    rows = read_table("oracles", text, masks=masks)
+    expected = whole[(whole["stage"] == "post") & whole["variant"].isin(["net", "blind"])]
+    assert rows["frame"].tolist() == sorted([*expected["frame"], 7])
+    assert kinds(rows) == KINDS
+    assert read_table("oracles", text, masks=[]).empty
+    with pytest.raises(ResultsError, match="lacks a value"):
+        read_table("oracles", text + line(9, "net").replace(",2,", ",,"), masks=masks)
+
+
 def test_a_drive_s_and_a_camera_s_name_may_hold_anything(tmp_path):
     key = Key('a, "b"\n', "/front/image")
     rows = {"disagreements": [(1, "filtered", "unfiltered", 2, 3, 9)]}

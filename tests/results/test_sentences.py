@@ -232,6 +232,18 @@ def test_reasons_are_read_back_as_they_were_written():
 # --- Slices over drives: tags, and times of the drive and of the day, are conditions, too ---------
 
 
+def slices_of(frames, conditions, regions, parts, drives):
+    tables = {
+        "conditions": conditions.drop(columns=["group", "tag_weather"]),
+        "frames": frames.assign(variant="net", stage="post", final=True),
+        "regions": regions.rename(columns={"wrong": "FP"}).assign(FN=0, variant="net"),
+        "parts": parts.assign(variant="net"),
+    }
+    names = dict(zip(drives["drive"], drives["drive"], strict=True))
+    slices = slices_over_drives(lambda name, _: tables[name], drives, names, 0.95)
+    return slices.get("net", [])
+
+
 @pytest.mark.parametrize(("drives", "named"), [(40, True), (0, False)])
 def test_a_tag_of_a_drive_is_a_condition_and_a_fleet_without_drives_has_none(drives, named):
     real = pd.DataFrame({"brightness": np.linspace(0, 1, 60)})
@@ -239,13 +251,23 @@ def test_a_tag_of_a_drive_is_a_condition_and_a_fleet_without_drives_has_none(dri
     names, weathers = zip(*conditions.groupby("drive")["tag_weather"].first().items(), strict=True)
     table = pd.DataFrame({"drive": names, "evaluated": 60, "tag_weather": weathers})[:drives]
     frames.loc[(conditions["tag_weather"] == "rain").to_numpy(), "FP"] *= 4
-    tables = {
-        "conditions": conditions.drop(columns=["group", "tag_weather"]),
-        "frames": frames.assign(variant="net", stage="post", final=True),
-        "regions": parts.rename(columns={"wrong": "FP"}).assign(FN=0, variant="net"),
-    }
-    slices = slices_over_drives(
-        lambda name, _: tables[name], table, dict(zip(names, names, strict=True)), 0.95
-    )
-    conditions_named = [s.conditions for s in slices.get("net", [])]
+    slices = slices_of(frames, conditions, parts, parts[:0], table)
+    conditions_named = [confirmed.conditions for confirmed in slices]
     assert ([FrameCondition("tag_weather", "is", "rain")] in conditions_named) == named
+
+
+@pytest.mark.parametrize("part", ["left", "on verge"])
+def test_a_half_and_a_class_are_parts_of_a_fleet(part):
+    real = pd.DataFrame({"brightness": np.linspace(0, 1, 60)})
+    frames, conditions, regions = make_fleet(np.random.default_rng(6), [real], 40)
+    drives = pd.DataFrame({"drive": conditions["drive"].unique(), "evaluated": 60})
+    # A class is named under conditions alone: the table of classes has its errors.
+    is_worse = (conditions["brightness"] > 0.6) | (part == "left")
+    wrong = (frames["FP"] + frames["FN"]) * np.where(is_worse, 0.8, 0.2)
+    half = frames[["drive", "camera", "frame"]].assign(N=frames["N"] // 2)
+    parts = half.assign(region=part, wrong=wrong.astype(int))
+    slices = slices_of(frames, conditions, regions, parts, drives)
+    assert [s.part for s in slices] == [part]
+    assert [c.quantity for c in slices[0].conditions] == ["brightness"] * (part != "left")
+    assert slices[0].ratio > 1.5
+    assert slices_of(frames, conditions, regions, parts[:0], drives) == []

@@ -62,6 +62,14 @@ def report(
     open_report: Annotated[
         bool, arguments.option("--open", "Open the report in the browser, or in the PDF viewer.")
     ] = False,
+    audit: Annotated[
+        Path | None,
+        arguments.option(
+            "--audit",
+            "Folder of 'roadeval audit': the report begins with what it says of the labels.",
+            "FOLDER",
+        ),
+    ] = None,
     camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -81,7 +89,7 @@ def report(
     paths = write_figures(opened, figures, width=width, title=title) if figures else []
     if output or not figures:
         with progress.show(quiet) as watch:
-            paths.append(write_report(opened, output, on_progress=watch))
+            paths.append(write_report(opened, output, audit=audit, on_progress=watch))
     for path in paths if not quiet else ():
         console.emit(str(path))
     messages.warning(*opened.warnings)

@@ -294,11 +294,10 @@ def _compare_two(
         finals = finals[finals["variant"] != BASELINE]
         if several:
             drives += _drive_changes(new.label, drive_names, finals, settings)
-        # A whole table of regions takes more memory than all else: only one is there at a time.
-        sources = ((new, {key: key for key in new_keys.values()}), (base, new_keys))
-        counted = [tables.finals(side.table("regions", keys)) for side, keys in sources]
-        parts = pairing.common_regions(finals, *counted)
-        regions.append(by_drive(parts, ["variant", "region"], groups))
+        del base_rows, new_rows  # regions take more memory than all else
+        new_regions = new.table("regions", {key: key for key in new_keys.values()})
+        parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
+        regions.append(by_drive(parts, ["variant", "region"], groups, [TESTED]))
     if not masks:
         raise RoadevalError(
             f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
@@ -389,24 +388,28 @@ def _of_drives(rows: pd.DataFrame, drives: Collection[tuple[str, str]]) -> pd.Da
 
 
 def by_drive(
-    rows: pd.DataFrame, by: Sequence[str], groups: Mapping[tuple[str, str], str]
+    rows: pd.DataFrame,
+    by: Sequence[str],
+    groups: Mapping[tuple[str, str], str],
+    rates: Collection[str] = tuple(METRICS),
 ) -> pd.DataFrame:
     """Sum up each drive's rows of frames, or pairs of them, by the columns ``by``.
 
     Columns are ``frames``, whether all are ``final``, the summed counts, the means of the frames'
-    rates, and ``group``, by drive and camera from ``groups``. Pairs have also the base's counts and
-    rates, which end in ``_base``, and the means of the differences, such as ``change_ERR``.
+    ``rates``, and ``group``, by drive and camera from ``groups``. Pairs have also the base's counts
+    and rates, which end in ``_base``, and the means of the differences, such as ``change_ERR``.
     """
     import pandas as pd
 
-    counts, rates = [*COUNTS], [rates_of(rows, METRICS)]
+    chosen = {name: METRICS[name] for name in rates}
+    counts, parts = [*COUNTS], [rates_of(rows, chosen)]
     if "TP_base" in rows:
-        old = rates_of(rows, METRICS, end="_base")
-        change = rates[0] - old.set_axis([*METRICS], axis=1)
-        rates += [old, change.add_prefix("change_")]
+        old = rates_of(rows, chosen, end="_base")
+        change = parts[0] - old.set_axis([*chosen], axis=1)
+        parts += [old, change.add_prefix("change_")]
         counts += [f"{name}_base" for name in COUNTS]
     keys = [*KEY, *by]
-    by_keys, rated = group_rows(rows, keys), pd.concat([rows[keys], *rates], axis=1)
+    by_keys, rated = group_rows(rows, keys), pd.concat([rows[keys], *parts], axis=1)
     sums = by_keys[counts].sum().assign(frames=by_keys.size(), final=by_keys["final"].all())
     drives = sums.join(group_rows(rated, keys).mean()).reset_index()
     names = [groups[key] for key in zip(drives["drive"], drives["camera"], strict=True)]

@@ -7,6 +7,7 @@ described by them (`roadeval.evaluation.stats.slices`).
 from __future__ import annotations
 
 import math
+import re
 from array import array
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +17,7 @@ import numpy as np
 
 from roadeval.data import NO_CLASS, ROAD, FrameResult, Rgb, Truth, TruthClass
 from roadeval.data.arrays import FN, FP, IGNORED, Plane
-from roadeval.evaluation.stats.slices import ON_CLASS
+from roadeval.evaluation.stats.slices import OF_REGIONS, ON_CLASS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +86,7 @@ def parts_of(result: FrameResult) -> Iterator[tuple[str, str | int, int, int]]:
     """
     for tally in {tally.variant: tally for tally in result.tallies}.values():
         for name, counts in tally.regions.items():
-            if name.startswith("band_") or name[0].isdigit():
+            if re.match(OF_REGIONS, name):
                 yield tally.variant, name, counts.fp + counts.fn, counts.n
     for variant, errors in result.errors.items():
         halves = np.array_split(errors.array.astype(np.uint8, copy=False), 2, axis=1)
@@ -149,22 +150,23 @@ class FrameConditions:
         table[[*QUANTITIES]] = np.array(self._values).reshape(-1, len(QUANTITIES))
         return table
 
-    def parts(self, variant: str, classes: Sequence[TruthClass] = ()) -> pd.DataFrame:
-        """Return the wrong and the labelled pixels of a final mask: a row for each frame and part.
+    def parts(self, classes: Sequence[TruthClass] = ()) -> pd.DataFrame:
+        """Return a row for each frame, final mask and part: the wrong and the labelled pixels.
 
         ``classes`` are the truth's, in the order of codes; each is a part, ``on <name>``.
         """
         import pandas as pd
 
-        columns, tables = ["frame", "wrong", "N"], []
-        for (owner, part), numbers in self._parts.items():
+        columns = ["frame", "variant", "region", "wrong", "N"]
+        tables = [pd.DataFrame(columns=columns)]
+        for (variant, part), numbers in self._parts.items():
             name, truth = part, "other"
             if isinstance(part, int):
                 value, name, truth = classes[part] if classes else (0, "", "ignored")
                 name = f"{ON_CLASS}{name or f'class {value}'}"
-            if owner == variant and truth != "ignored":
-                rows = pd.DataFrame(np.reshape(numbers, (-1, 3)), columns=columns)
-                if truth == "road":
-                    rows["wrong"] = rows["N"] - rows["wrong"]
-                tables.append(rows.assign(region=name))
-        return pd.concat(tables) if tables else pd.DataFrame(columns=[*columns, "region"])
+            if truth != "ignored":
+                frame, wrong, pixels = np.reshape(numbers, (-1, 3)).T
+                wrong = pixels - wrong if truth == "road" else wrong
+                values = (frame, variant, name, wrong, pixels)
+                tables.append(pd.DataFrame(dict(zip(columns, values, strict=True))))
+        return pd.concat(tables[1:] or tables)

@@ -355,9 +355,13 @@ class Scoreboard:
             "kitti": benchmark(self._kitti),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": seconds,
-            "slices": self._slices(frames, classes if any(self.classes.rows(classes)) else ()),
+            "slices": self._slices(frames, classes),
         }
         return DriveSums(frames, windows, drive_effects(frames, settings), parts, disturbed)
+
+    def parts(self, classes: Sequence[data.TruthClass] = ()) -> pd.DataFrame:
+        """Return the counts of the frames' parts, see `FrameConditions.parts`."""
+        return self.conditions.parts(classes if any(self.classes.rows(classes)) else ())
 
     def _slices(
         self, frames: pd.DataFrame, classes: Sequence[data.TruthClass]
@@ -365,10 +369,9 @@ class Scoreboard:
         """Return the slices of final masks by variant, if they have enough frames."""
         key, confidence = dict(zip(KEY, self._key, strict=True)), self._settings.confidence
         conditions = self.conditions.table().assign(**key)
+        parts = self.parts(classes).assign(**key)
         return {
-            variant: find_slices(
-                rows, conditions, self.conditions.parts(variant, classes).assign(**key), confidence
-            )
+            variant: find_slices(rows, conditions, only(parts, variant=variant), confidence)
             for (variant,), rows in tables.group_rows(tables.finals(frames), ["variant"])
             if variant != BASELINE and len(rows) >= LEAST_FRAMES
         }

@@ -66,6 +66,8 @@ SHOWN: Final = 3
 """Number of worst frames of a slice."""
 ON_CLASS: Final = "on "
 """Prefix of a part that is a class of the truth."""
+OF_REGIONS: Final = r"band_|\d"
+"""Beginnings of the parts that are also regions: bands of rows, and distances."""
 SCENES: Final = 30
 """Number of stretches of a drive; at most one frame of each is shown."""
 

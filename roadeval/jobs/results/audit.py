@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, ROAD, colours
@@ -28,7 +29,9 @@ from roadeval.results.facts import is_fleet
 from roadeval.results.folder import RUN
 from roadeval.results.labels import describe_annotator, describe_suspect, describe_suspects
 from roadeval.results.rows import records
+from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import AnyPath, put, writing
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,6 +52,8 @@ class Audit:
     """Number of labels that were examined."""
     sentences: list[str]
     """Sentences on misfits of the whole drive, on wrong labels, and on other annotators."""
+    doubts: list[str]
+    """Those of them that name wrong labels, or say how two people differ."""
     log: str
     """The place of the log."""
     config: Path | None
@@ -111,7 +116,7 @@ def audit(
         suspects = rank_suspects(concatenate(tables), len(frames), count)
         suspects.insert(0, "rank", range(1, len(suspects) + 1))
         suspects["why"] = [describe_suspect(row) for row in records(suspects)]
-        sentences = [*drive.facts.misfits, describe_suspects(suspects)]
+        on_labels = [describe_suspects(suspects)]
         for name in annotators:
             pairs = ((drive.truth(n), drive.final_masks(n).get(name)) for n in frames)
             shares = [
@@ -121,12 +126,15 @@ def audit(
             ]
             if not shares:
                 raise RoadevalError(f"{path}: no masks of {name} on a frame with truth")
-            sentences.append(describe_annotator(name, float(np.mean(shares)), len(shares)))
-        if output:
-            _write_audit(drive, suspects, output, labels, run)
+            on_labels.append(describe_annotator(name, float(np.mean(shares)), len(shares)))
         repeats = path if run is None else output and output / RUN
         log = drive.facts.log
-        return Audit(suspects, len(frames), sentences, log.path if log else drive.name, repeats)
+        doubts = on_labels if suspects["clear"].any() else on_labels[1:]
+        sentences, name = [*drive.facts.misfits, *on_labels], log.path if log else drive.name
+        done = Audit(suspects, len(frames), sentences, doubts, name, repeats)
+        if output:
+            _write_audit(drive, done, output, labels, run)
+        return done
 
 
 def _check_scale(scale: float) -> None:
@@ -142,13 +150,36 @@ def _view(drive: DriveResult, frame: int) -> LabelledView:
     return LabelledView.of(frame, stamp, recording.image(frame), truth, masks)
 
 
+def read_doubts(folder: AnyPath, drive: DriveResult) -> list[str]:
+    """Read the sentences on the labels of a drive from the folder of its audit.
+
+    A `RoadevalError` if it is no such folder, or of another drive.
+    """
+    path = Path(folder, AUDIT)
+    try:
+        about = read_json(read_bounded(path))
+        sentences = TypeAdapter(list[str]).validate_python(about["sentences"])
+        name, camera = about["drive"], about["camera"]
+    except FileNotFoundError:
+        problem = "is no folder of roadeval audit"
+        raise RoadevalError(problem, where=folder, remedy="make one with -o") from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = str(error).partition("\n")[0]
+        remedy = "audit into a new folder"
+        raise RoadevalError(f"damaged ({reason})", where=path, remedy=remedy) from error
+    if (name, camera) != (drive.name, drive.facts.drive.camera):
+        about_other = visible(f"is of {name} {camera}, not of")
+        raise RoadevalError(f"{about_other} {drive.title}", where=path)
+    return [*map(visible, sentences)]
+
+
 def _write_audit(
-    drive: DriveResult, suspects: pd.DataFrame, folder: Path, labels: str, run: str | None
+    drive: DriveResult, done: Audit, folder: Path, labels: str, run: str | None
 ) -> None:
     """Write images, labels to correct and pictures, and at the end the list of suspects."""
     import cv2
 
-    recording, facts, rows = drive.recording, drive.facts, records(suspects)
+    recording, facts, rows = drive.recording, drive.facts, records(done.suspects)
     square = np.ones((3, 3), np.uint8)
     assert recording is not None
     with writing(folder, RoadevalError):
@@ -173,12 +204,13 @@ def _write_audit(
             (folder / PROPOSALS / name).write_bytes(content)
         if run:
             put(folder / RUN, run.encode())
-        put(folder / "audit.csv", suspects.to_csv(index=False).encode())
+        put(folder / "audit.csv", done.suspects.to_csv(index=False).encode())
         about = {
             "format": FORMAT,
             "drive": drive.name,
             "camera": facts.drive.camera,
             "run": {name: facts.run.get(name, {}) for name in ("truth", "labels", "topics")},
+            "sentences": done.doubts,
             "suspects": rows,
         }
         put(folder / AUDIT, f"{json.dumps(about, indent=1)}\n".encode())

@@ -89,7 +89,7 @@ def compare(
     across = len(paths) == 1
     opened = [Result(path) for path in paths]
     if across:
-        opened_side = Side(opened[0].name, opened[0].compared, opened[0].table)
+        opened_side = Side(opened[0].name, opened[0].compared, partial(_read_table, opened[0]))
         sides = variants_as_sides(opened_side, opened[0].variants, variants)
         opened *= len(sides)
     else:
@@ -121,6 +121,10 @@ def compare(
     }
     judgements = tuple(judge(comparison, conditions, settings))
     return Compared(comparison, judgements, tuple(one_drive_sides or ()), recordings, tuple(lost))
+
+
+def _read_table(result: Result, name: str, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
+    return result.table(name, drives, final=name == "regions")
 
 
 def _choose_paths(listing: Listing, on_progress: OnProgress) -> tuple[list[Path], Sequence[str]]:
@@ -181,7 +185,8 @@ def _choose_sides(
             named_variants, choices = ", ".join(names), ", ".join(result.variants)
             raise RoadevalError(f"{label}: no variant {named_variants}; there are {choices}")
         title = f"{label} ({renamed})" if renamed and not sides else label
-        sides.append(Side(title, result.compared, result.table, names if pairs else None))
+        read = partial(_read_table, result)
+        sides.append(Side(title, result.compared, read, names if pairs else None))
     return sides
 
 

@@ -11,7 +11,6 @@ from typing import Final, Literal
 from roadeval.data import as_plain
 from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.tables import finals
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.results.frames import FramePicker, evenly
@@ -25,7 +24,8 @@ from roadeval.report.pdf.typeset import typeset
 from roadeval.report.writing import write_file
 from roadeval.results.facts import FETCHED, Facts
 from roadeval.results.fleet import FleetFolder
-from roadeval.runtime.files import leads_outside, writing
+from roadeval.results.why import with_doubts
+from roadeval.runtime.files import AnyPath, leads_outside, writing
 
 PAGES: Final = (".html", ".htm")
 """Endings of files that are written as a page."""
@@ -38,6 +38,7 @@ def write_report(
     output: str | Path | None = None,
     *,
     focus: str | None = None,
+    audit: AnyPath | None = None,
     on_progress: OnProgress = ignore,
 ) -> Path:
     """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
@@ -55,6 +56,8 @@ def write_report(
         in ``.html`` gives a page.
     focus
         The variant that the report is about; see `roadeval.Result`, which has it if it was opened.
+    audit
+        The folder of an audit of the drive: what it says of the labels is told among the reasons.
     on_progress
         Called with each pictured frame of a page.
     """
@@ -67,10 +70,18 @@ def write_report(
     path = Path(output or beside.with_name(f"{beside.name}.pdf"))
     if not (output or usual) and leads_outside(path, source):  # it may come from someone else
         raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
+    findings = findings_of(opened)
+    if audit is not None:
+        if opened.drive is None or not isinstance(findings, Findings):
+            raise RoadevalError("an audit is of one camera of a drive", where=audit)
+        from roadeval.jobs.results.audit import read_doubts
+
+        doubts = read_doubts(audit, opened.drive)
+        findings = replace(findings, facts=with_doubts(findings.facts, doubts))
     with holding(path, inputs=[source]):
         if path.suffix.lower() not in PAGES:
-            return write_file(path, typeset(document(findings_of(opened))))
-        return write_file(path, page(page_of(opened, on_progress, path.parent)))
+            return write_file(path, typeset(document(findings)))
+        return write_file(path, page(_page_of(opened, findings, on_progress, path.parent)))
 
 
 WIDTHS: Final = (4, 100)
@@ -175,9 +186,10 @@ def findings_of(result: Result) -> Findings | FleetFolder:
     )
 
 
-def page_of(result: Result, on_progress: OnProgress = ignore, folder: Path = Path()) -> Report:
+def _page_of(
+    result: Result, findings: Findings | FleetFolder, on_progress: OnProgress, folder: Path
+) -> Report:
     """Return the page of a result, for a folder, as a document with its most telling frames."""
-    findings = findings_of(result)
     if result.drive is None:
         return page_document(findings, None, PICTURED_OF_FLEET, folder)
     frames = browsed(result.drive)
@@ -209,7 +221,7 @@ def _frames_of_figure_2(result: DriveResult) -> Sequence[int]:
 
 def collect(result: DriveResult) -> Findings:
     """Collect everything that the report of a drive shows."""
-    regions = finals(result.table("regions"))  # it takes the most memory, so it is first
+    regions = result.table("regions", final=True)  # it takes the most memory, so it is first
     pictured, picker = _pictured(result), FramePicker(result)
     worst = picker.worst()
     return Findings(

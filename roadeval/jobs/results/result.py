@@ -97,7 +97,7 @@ class DriveResult:
 
             self.recording = Recording(self.path, camera)
         self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path, camera)
-        self._read: Final[dict[str, pd.DataFrame]] = {}
+        self._read: Final[dict[tuple[str, bool], pd.DataFrame]] = {}
 
     @property
     def complete(self) -> bool:
@@ -206,20 +206,21 @@ class DriveResult:
         """Drive and camera, the first cells of every row of its tables."""
         return Key(visible(self.name), visible(self.facts.drive.camera))
 
-    def table(self, name: str) -> pd.DataFrame:
+    def table(self, name: str, *, final: bool = False) -> pd.DataFrame:
         """Return the rows of a table, such as ``oracles``; there are none if the run counted none.
 
-        A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
-        are left out, and so are sums over all frames.
+        With ``final`` only rows of final masks are returned, from ``frames`` or ``regions``. A
+        killed run may have cut one table: frames that are not in both of these are left out, and so
+        are sums over all frames.
         """
-        rows = self._read.get(name)
+        rows = self._read.get((name, final))
         if rows is None:
-            rows = self._table(name)
+            rows = self._table(name, final)
             if len(rows) <= KEPT_ROWS:
-                self._read[name] = rows
+                self._read[name, final] = rows
         return rows
 
-    def _table(self, name: str) -> pd.DataFrame:
+    def _table(self, name: str, final: bool) -> pd.DataFrame:
         match name:
             case "drives":
                 row = drive_row(self.facts, self.name, str(self.path))
@@ -232,7 +233,8 @@ class DriveResult:
                 )
             case "worst":
                 return table_of(name, ())
-        rows = self._tables.table(name)
+        masks = tables.final_stages(tables.masks_of(self.rows)).items() if final else None
+        rows = self._tables.table(name, masks)
         if self.complete or not len(rows) or name == "unlabelled":
             return rows
         return rows[rows["frame"].isin(self._both)] if "frame" in rows else rows[:0]
@@ -478,18 +480,26 @@ class Result:
             [tables.windows(result.table("frames"), size) for result in self._opened]
         )
 
-    def table(self, name: str, drives: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
+    def table(
+        self,
+        name: str,
+        drives: Collection[tuple[str, str]] | None = None,
+        *,
+        final: bool = False,
+    ) -> pd.DataFrame:
         """Return a table of all drives, or of some, by drive and camera.
 
-        The table ``regions`` of a fleet has the rows of final masks alone.
+        With ``final`` only the rows of final masks, of ``frames`` or ``regions``. The table
+        ``regions`` of a fleet has only these.
         """
         parts = []
         for result in self._opened:
             if isinstance(result, FleetFolder):
                 names = None if drives is None else {drive for drive, _ in drives}
-                parts.append(result.table(name, names))
+                rows = result.table(name, names)
+                parts.append(tables.finals(rows) if final else rows)
             elif drives is None or result.key in drives:
-                parts.append(result.table(name))
+                parts.append(result.table(name, final=final))
         return concatenate(parts)
 
 
