@@ -121,7 +121,7 @@ class DriveEntry:
     tags: Mapping[str, str] = field(default_factory=dict)
     """Facts about it, such as ``{"weather": "rain"}``."""
     settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    """Its own settings, in place of those of all drives, see `RunConfig.of_drive`."""
+    """Its own settings, which replace the settings of all drives, see `RunConfig.of_drive`."""
 
     @property
     def path(self) -> Path | None:
@@ -205,7 +205,7 @@ def is_log(name: str) -> bool:
 
 
 def name_cameras(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
-    """Return drives whose identity and name include the camera, if the log has several."""
+    """Return drives with the camera in identity and name, if the log has several cameras."""
     cameras = defaultdict[str, list[str]](list)
     for entry in entries:
         cameras[entry.source].append(entry.camera)
@@ -224,7 +224,7 @@ def name_cameras(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
 
 
 def is_bag(folder: Path) -> bool:
-    """Return whether a folder is one of rosbag2, whose files are one drive."""
+    """Return whether a folder is one of rosbag2; its files are one drive."""
     try:
         with (folder / METADATA).open("rb") as file:
             return BAG in file.read(HEAD)

@@ -282,7 +282,7 @@ class FactsFile:
 
     @property
     def evaluation(self) -> EvaluationSettings:
-        """The settings of the evaluation, by default those of this version.
+        """The settings of the evaluation, by default the settings of this version.
 
         A `ResultsError` if they are damaged.
         """
@@ -482,7 +482,7 @@ class FleetFacts(FactsFile):
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
     misfits: list[str] = field(default_factory=list)
-    """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
+    """Sentences on drives with truth or masks that do not fit; the verdict begins with them."""
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, over drives."""
     why: dict[str, list[Reason]] = field(default_factory=dict)

@@ -187,9 +187,9 @@ class FleetFolder:
     def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
         """Read a table of all drives, or of some of them.
 
-        The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and those of
-        `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
-        of final masks.
+        The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and so are the
+        tables `CACHED` of each drive; others are read from the drives' results. ``regions`` has the
+        rows of final masks.
         """
         if name in OF_DRIVES or (self.has_classes and name == "classes"):
             rows = read_parquet([self.path / f"{name}.parquet"], name)
@@ -434,7 +434,7 @@ class FleetWriter:
         return finals, within, dict(rows["disturbed"])
 
     def _add(self, member: Member, made: Made, rows: Mapping[str, list[Any]]) -> None:
-        """Add a drive's rows to those of each table."""
+        """Add a drive's rows to the rows of each table."""
         row: dict[str, Any] = {"drive": member.drive, "name": member.name, "source": member.source}
         row |= {"group": member.group, "fold": made.fold, "model": made.model, "camera": ""}
         row |= {f"{TAG}{key}": value for key, value in member.tags.items()}

@@ -211,7 +211,7 @@ def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Containe
 
 
 def _words_of(cells: pa.ChunkedArray) -> list[str]:
-    """Return the words of a column whose chunks share a dictionary."""
+    """Return the words of a column; its chunks share a dictionary."""
     words: list[str] = cells.chunk(0).dictionary.to_pylist() if cells.num_chunks else []
     return words
 

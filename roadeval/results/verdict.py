@@ -102,13 +102,13 @@ def verdict(
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
-    The default focus is that of `focus_of`. The verdict says how wrong the focus is, and in which
-    way; how it compares with the baseline and with the same method without the filter; which other
+    `focus_of` chooses the default focus. The verdict says how wrong the focus is, and in which way;
+    how it compares with the baseline and with the same method without the filter; which other
     variant is best, if there is one; and what to do next. ``totals`` are rates by variant and
-    stage, empty if nothing was scored; ``effects`` include those of final masks; ``thresholds`` are
-    the best ones, as in `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells
-    which frames to look at. ``estimated`` are rates of the whole drive, from frames drawn at
-    random.
+    stage, empty if nothing was scored; ``effects`` include the differences of final masks;
+    ``thresholds`` are the best ones, as in `roadeval.results.facts.Facts`. If nothing was scored,
+    ``unlabelled`` tells which frames to look at. ``estimated`` are rates of the whole drive, from
+    frames drawn at random.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])

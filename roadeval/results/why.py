@@ -120,7 +120,7 @@ _QUANTITIES: Final = {
     "seconds": ("{} {} s of the drive", "in the first", "after"),
     "hour": ("{} {} UTC", "before", "after"),
 }
-"""Words behind "frames" for each quantity, and those for below and above its limit."""
+"""Words behind "frames" for each quantity, and words for below and above its limit."""
 
 
 def describe_condition(condition: FrameCondition) -> str:

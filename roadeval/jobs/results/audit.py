@@ -53,7 +53,7 @@ class Audit:
     sentences: list[str]
     """Sentences on misfits of the whole drive, on wrong labels, and on other annotators."""
     doubts: list[str]
-    """Those of them that name wrong labels, or say how two people differ."""
+    """The sentences that name wrong labels, or say how two people differ."""
     log: str
     """The place of the log."""
     config: Path | None

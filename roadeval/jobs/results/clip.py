@@ -40,11 +40,12 @@ def clip(
 ) -> tuple[list[Path], list[str]]:
     """Write short films of where a result fails; return them, and the losses of the log, if any.
 
-    Errors are painted over the camera image: those of the ``focus`` on the left, and those of the
-    best other variant beside it. The result is a recording, its results folder, or a fleet; the
-    output is a folder, or the MP4 or GIF of one clip. The ``worst`` scenes are filmed, one clip
-    each, or the given ``frames``, such as ``range(40, 81)``. With ``mcap`` the messages of the log
-    lie beside each clip. A `RoadevalError` if there are no pictures, or a file cannot be written.
+    Errors are painted over the camera image: the errors of the ``focus`` on the left, and the
+    errors of the best other variant beside them. The result is a recording, its results folder, or
+    a fleet; the output is a folder, or the MP4 or GIF of one clip. The ``worst`` scenes are filmed,
+    one clip each, or the given ``frames``, such as ``range(40, 81)``. With ``mcap`` the messages of
+    the log lie beside each clip. A `RoadevalError` if there are no pictures, or a file cannot be
+    written.
     """
     place, films, losses = Path(output), list[Path](), list[str]()
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())

@@ -165,7 +165,7 @@ def _failure_sentence(result: Result) -> str:
 def _choose_sides(
     opened: Sequence[Result], paths: Sequence[Path], variants: Sequence[str] | None
 ) -> list[Side]:
-    """Return several results, each with those of its variants that are compared.
+    """Return several results, each with the variants of it that are compared.
 
     A result is named by its file, or by its whole path if another has the same name.
     """

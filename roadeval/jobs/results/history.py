@@ -107,7 +107,7 @@ def history(
 ) -> History:
     """Read many results as one history, and find which rate changed in which run.
 
-    A `RoadevalError` if fewer than two of them can be read; the history lists those that cannot.
+    A `RoadevalError` if fewer than two of them can be read; the history lists the others.
 
     Parameters
     ----------

@@ -127,7 +127,7 @@ class Run:
     """The frames that are not evaluated because the model learnt from them or from neighbours."""
     chains: Mapping[str, Chain]
     layouts: tuple[VariantLayout, ...]
-    """Every variant that is scored, including those with masks in the log."""
+    """Every variant that is scored, also variants with masks in the log."""
     methods: Mapping[str, Mapping[str, Any]]
     """Facts of stages beside their settings, by variant and stage. They are read before the first
     frame: a file that they name may be gone after the last."""
@@ -141,7 +141,7 @@ class Run:
 
     @cached_property
     def disturbed_variants(self) -> tuple[str, ...]:
-        """The variants that run on disturbed frames: those without masks from elsewhere."""
+        """The variants that run on disturbed frames: all variants without masks from elsewhere."""
         return tuple(v.name for v in self.variants if "given" not in v.pipeline.settings)
 
     @cached_property
