@@ -26,8 +26,8 @@ from roadeval.images.formats import ImageError, ImageFormat, Limits, format_of
 Array = npt.NDArray[Any]
 File = bytes | memoryview
 
-_SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
-"""Pillow's modes of images with one number a pixel."""
+_DEEP: Final = ("I;16", "I;16B", "I;16L", "I", "F")
+"""Pillow's modes of images with one number of more than eight bits a pixel."""
 _SCAN: Final = b"\xff\xda"
 _TWELVE_BITS: Final = re.compile(rb"\xff[\xc0-\xc2]\x00[\x0b\x11]\x0c", re.DOTALL)
 """The head of a JPEG frame of one or three colours with 12 bits a sample."""
@@ -45,8 +45,8 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
     image = _decode(data, limits)
     if isinstance(image, np.ndarray):
         pixels = image
-    elif image.mode in _SAMPLES:
-        pixels = np.repeat(eight_bits(_samples(image), white)[..., None], 3, axis=2)
+    elif image.mode in _DEEP:
+        pixels = np.repeat(eight_bits(_samples(image, data), white)[..., None], 3, axis=2)
     elif (deep := _deep_colours(data)) is not None:
         pixels = eight_bits(deep, white)
     else:
@@ -57,8 +57,8 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
 def deep_samples(data: File, limits: Limits) -> Array | None:
     """Return samples of more than eight bits; None for other images. Errors as in `to_rgb`."""
     image = _decode(data, limits)
-    is_grey = not isinstance(image, np.ndarray) and image.mode in _SAMPLES
-    samples = _samples(image) if is_grey else _deep_colours(data)
+    is_grey = not isinstance(image, np.ndarray) and image.mode in _DEEP
+    samples = _samples(image, data) if is_grey else _deep_colours(data)
     return None if samples is None or samples.dtype == np.uint8 else samples
 
 
@@ -85,10 +85,10 @@ def to_labels(data: File, limits: Limits) -> Array:
     count as one. An image of a single colour that is transparent in parts gives its opacity. Errors
     as in `to_rgb`, and if one of several colours is transparent in parts.
     """
-    return upright(_label_values(_decode(data, limits)), _left_to_turn(data, limits))
+    return upright(_label_values(_decode(data, limits), data), _left_to_turn(data, limits))
 
 
-def _label_values(image: Any) -> Array:
+def _label_values(image: Any, data: File) -> Array:
     if isinstance(image, np.ndarray):
         return without_colours(image)
     if image.mode == "P":
@@ -97,8 +97,8 @@ def _label_values(image: Any) -> Array:
         used = palette[: int(indices.max()) + 1]
         greys = (used == used[:, :1]).all() and len(used) > 1
         return np.ascontiguousarray(used[indices, 0]) if greys else indices
-    if image.mode in _SAMPLES:
-        samples = _samples(image)
+    if image.mode in ("L", *_DEEP):
+        samples = _samples(image, data)
         return samples if samples.dtype.kind != "f" else eight_bits(samples)
     colours = np.array(image.convert("RGB"))
     opacity = np.array(image.getchannel("A")) if image.mode in {"RGBA", "LA"} else np.full(1, 255)
@@ -280,9 +280,14 @@ def _damage_in(format_: ImageFormat) -> Iterator[None]:
         raise ImageError(f"a damaged {format_.name} ({reason})") from error
 
 
-def _samples(image: Any) -> Array:
-    """Return the numbers of an image, in this machine's byte order."""
+def _samples(image: Any, data: File) -> Array:
+    """Return the numbers of an image as its file has them, in this machine's byte order."""
+    import cv2
+
     samples = np.array(image)
+    if image.format in ("PPM", "JPEG2000"):  # Pillow scales them to 8 or 16 bits
+        stored: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        samples = samples if stored is None else stored
     # Pillow holds samples of 16 bits in 32 bits for some formats.
     if samples.dtype == np.int32 and 0 <= samples.min() <= samples.max() < 1 << 16:
         samples = samples.astype(np.uint16)

@@ -1,6 +1,7 @@
 """Image files to arrays; damage and size are told before anything else."""
 
 import io
+from base64 import b85decode
 from contextlib import suppress
 
 import cv2
@@ -98,6 +99,35 @@ CLEAR, BLACK, WHITE = (255, 255, 255, 0), (0, 0, 0, 0), (255, 255, 255, 255)
 )
 def test_labels_keep_sign_size_and_opacity(name, pixels, labels) -> None:
     assert to_labels(file(name, pixels), LIMITS).tolist() == [labels]
+
+
+@pytest.mark.parametrize("greatest", [1, 18, 255, 1000, 4095, 65535])
+def test_a_pgm_keeps_its_numbers_whatever_its_greatest_is(greatest: int) -> None:
+    # Pillow 13.0 scales them to 8 or 16 bits.
+    values = np.array([[0, 1, greatest // 2, greatest]])
+    samples = values.astype(np.uint8 if greatest < 256 else ">u2").tobytes()
+    file = f"P5\n# a comment\n4 1\n{greatest}\n".encode() + samples
+    assert to_labels(file, Limits()).tolist() == values.tolist()
+    image = to_rgb(file, Limits(), greatest if greatest > 255 else None)[..., 0]
+    assert np.abs(image - 255 * (values / greatest)).max() <= 1
+    deep = deep_samples(file, Limits())
+    assert deep is None if greatest < 256 else deep.tolist() == values.tolist()
+
+
+TWELVE_BITS = b85decode(
+    "0000CYEU2`4GM<}0000KW^{RQYH%_j00000YH%_j0000jYH%`W0000MX=r3}0000200004009dJ0000001sntY;pkr0"
+    "00005dZ)Hk7{r-WB*V8Q2;3b000001ONa40ssI200000000001ONa40ssI2000000003C0RjI~01N;C009611Oxy9|6"
+    "BkBKw$r503`qcLvm$dbY)~9VtF7>aAj^vP(?=|c4cyNX>V>IGA=bPH2;tQ3IG5A0012T0soWV;4ldp=n`I|yY%Pdj("
+    "`8z"
+)
+"""A JPEG 2000 by OpenJPEG, without loss, that states 12 bits."""
+
+
+def test_a_jpeg_2000_of_twelve_bits_keeps_its_numbers() -> None:
+    # Pillow 13.0 multiplies them by 16.
+    samples = deep_samples(TWELVE_BITS, Limits())
+    assert samples is not None
+    assert samples.tolist() == [[0, 1, 2048, 4095]] * 2
 
 
 def test_a_label_image_whose_opacity_says_more_than_its_colours_is_refused() -> None:
