@@ -14,7 +14,8 @@ class RoadevalError(Exception):
 
     Its text is one line, without the passwords of URLs. It names settings as Python does. The
     terminal prints it without a traceback, names settings by their flags, and exits with code 1.
-    Rooms derive their own errors from it; anything else that escapes is a defect of the program.
+    A room derives an error of its own if some caller must tell it apart. Anything else that escapes
+    is a defect of the program.
     """
 
     def __init__(
@@ -76,13 +77,9 @@ class RoadevalError(Exception):
         return str(self.sentence)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remake, (type(self), self.args), self.__dict__
+        # A constructor may take other arguments, so none is called.
+        return type(self).__new__, (type(self), *self.args), self.__dict__
 
 
 class SettingError(RoadevalError, ValueError):
     """Settings of one table that cannot be used; the message names them without their table."""
-
-
-def _remake(kind: type[RoadevalError], arguments: tuple[Any, ...]) -> RoadevalError:
-    """Make an error without its constructor, which may take other arguments."""
-    return kind.__new__(kind, *arguments)

@@ -112,7 +112,11 @@ def configuration(options: OptionValues) -> RunConfig:
         config = config.with_tuned(options.get("tunes", ()))
         if "only" in options:
             config = config.override({"only": options["only"]})
-    config = _first_brought(config, options)
+    # By default computed variants come before masks of other methods; here the first typed one is.
+    methods, names = ("variants", "nets", "topics.masks", "masks"), config.brought()
+    typed = [name for o in options if o in methods for name, _ in options[o] if name in names]
+    if not config.output.focus and names and names[0] in typed[1:]:
+        config = config.override({"output": {"focus": typed[0]}})
     if path := options.get("ground"):
         ground = read_camera(path, config.topics.image)
         with in_file(str(path)):
@@ -124,19 +128,6 @@ def configuration(options: OptionValues) -> RunConfig:
             f"({config.training.model})"
         )
     return config
-
-
-def _first_brought(config: RunConfig, options: OptionValues) -> RunConfig:
-    """Return the configuration with the first variant that was typed as its focus.
-
-    By default computed variants come before masks of other methods.
-    """
-    methods = ("variants", "nets", "topics.masks", "masks")
-    names = config.brought()
-    typed = [name for o in options if o in methods for name, _ in options[o] if name in names]
-    if config.output.focus or not names or names[0] not in typed[1:]:
-        return config
-    return config.override({"output": {"focus": typed[0]}})
 
 
 def _variant(name: str, path: str | None) -> Variant:

@@ -151,30 +151,22 @@ def _make_options() -> Iterator[Option]:
         for field in dataclasses.fields(settings):
             hint = hints[field.name]
             flag = next((extra for extra in get_args(hint)[1:] if isinstance(extra, Flag)), None)
-            if flag is not None:
-                flags = tuple(flag.names.split())
-                kind, read = _kind(hint, f"{flags[-1]} {flag.metavar.partition('=')[0]}")
-                setting = f"{table}.{field.name}".removeprefix(".")
-                yield Option(
-                    setting,
-                    flags,
-                    flag.metavar or None,
-                    _help(texts[field.name], kind, field.default),
-                    kind,
-                    read,
-                    MOST_USED if setting in FIRST else flag.group or group,
-                )
-
-
-def _help(meaning: str, kind: Any, default: Any) -> str:
-    """Return the first sentence of a setting's meaning, and its default."""
-    first, *others = re.split(r"(?<=[.:]) (?=[A-Z])", " ".join(meaning.replace("``", "").split()))
-    help_text = [first, *(sentence for sentence in others if sentence.startswith("Default"))]
-    if get_origin(kind) is list:
-        help_text.append("Repeatable.")
-    elif default and default is not dataclasses.MISSING and kind is not bool:
-        help_text.append(f"Default: {default}.")
-    return " ".join(help_text)
+            if flag is None:
+                continue
+            flags = tuple(flag.names.split())
+            kind, read = _kind(hint, f"{flags[-1]} {flag.metavar.partition('=')[0]}")
+            # The help is the first sentence of the setting's meaning, and its default.
+            meaning = " ".join(texts[field.name].replace("``", "").split())
+            first, *others = re.split(r"(?<=[.:]) (?=[A-Z])", meaning)
+            sentences = [first, *(text for text in others if text.startswith("Default"))]
+            if get_origin(kind) is list:
+                sentences.append("Repeatable.")
+            elif field.default and field.default is not dataclasses.MISSING and kind is not bool:
+                sentences.append(f"Default: {field.default}.")
+            setting = f"{table}.{field.name}".removeprefix(".")
+            heading = MOST_USED if setting in FIRST else flag.group or group
+            help_text = " ".join(sentences)
+            yield Option(setting, flags, flag.metavar or None, help_text, kind, read, heading)
 
 
 def _kind(hint: Any, names: str) -> tuple[Any, Callable[[str], Any] | None]:

@@ -121,7 +121,7 @@ class DriveEntry:
     tags: Mapping[str, str] = field(default_factory=dict)
     """Facts about it, such as ``{"weather": "rain"}``."""
     settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    """Its own settings, in place of those of all drives, see `RunConfig.of_drive`."""
+    """Its own settings, which replace the settings of all drives, see `RunConfig.of_drive`."""
 
     @property
     def path(self) -> Path | None:
@@ -144,7 +144,7 @@ class DriveEntry:
         return self.group, self.tags, self.settings
 
     def of_cameras(self, cameras: Iterable[CameraSettings]) -> Iterator[DriveEntry]:
-        """Yield an entry for each of some cameras; itself if its own settings state the camera."""
+        """Yield an entry for each camera, or this entry if its own settings state the camera."""
         if self.camera:
             yield self
             return
@@ -205,7 +205,7 @@ def is_log(name: str) -> bool:
 
 
 def name_cameras(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
-    """Return drives whose identity and name include the camera, if the log has several."""
+    """Return drives with the camera in identity and name, if the log has several cameras."""
     cameras = defaultdict[str, list[str]](list)
     for entry in entries:
         cameras[entry.source].append(entry.camera)
@@ -224,7 +224,7 @@ def name_cameras(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
 
 
 def is_bag(folder: Path) -> bool:
-    """Return whether a folder is one of rosbag2, whose files are one drive."""
+    """Return whether a folder is one of rosbag2; its files are one drive."""
     try:
         with (folder / METADATA).open("rb") as file:
             return BAG in file.read(HEAD)
@@ -389,13 +389,13 @@ def _find_below(folder: Path) -> list[Path]:
         raise FleetError(error.strerror or str(error), where=where) from error
 
     drives: list[Path] = []
-    seen: set[Path] = set()
+    visited: set[Path] = set()
     for name, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
         here = Path(name)
-        if here.resolve() in seen:
+        if here.resolve() in visited:
             folders.clear()
             continue
-        seen.add(here.resolve())
+        visited.add(here.resolve())
         folders[:] = sorted(filter(is_usable, folders))
         drives += [here] if is_bag(here) else [here / file for file in files if is_log(file)]
     return sorted(drives, key=lambda path: natural_path(path.relative_to(folder)))

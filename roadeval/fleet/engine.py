@@ -17,7 +17,8 @@ from roadeval.fleet.drives import FleetError
 from roadeval.runtime.sentence import Sentence
 
 ATTEMPTS: Final = 2
-"""Attempts at a drive whose worker dies; on a cluster the settings of the scheduler decide."""
+"""Number of attempts at a drive if workers die; on a cluster the settings of the scheduler
+decide."""
 ANSWER_S: Final = 15
 """Seconds in which a scheduler must answer."""
 _LOCAL: Final = {

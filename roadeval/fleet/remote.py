@@ -51,7 +51,7 @@ PATIENCE_S: Final = 20.0
 """Seconds that a server may be silent, see `roadeval.config.settings.ExecutionSettings`."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4}
 PART: Final = 64 << 10
-"""Least bytes of a part that was not expected; parts that are closer than this are read as one."""
+"""Least number of bytes of an unexpected part; parts that are closer than this are read as one."""
 TAIL: Final = 128 << 10
 """Bytes at the end that are read in one request: the summary of a log of one gigabyte."""
 AT_ONCE: Final = 16
@@ -61,7 +61,7 @@ PIECE: Final = 1 << 20
 ROOM: Final = 2 << 30
 """Greatest number of bytes of a result that are fetched, and that are unpacked."""
 TOO_LARGE: Final = f"larger than {ROOM >> 30} GiB"
-_home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # until the process ends
+_home: Final = cache(partial(TemporaryDirectory, prefix="roadeval-"))  # kept until the end
 _POLL_S: Final = 0.2
 """Seconds between two checks for an answer."""
 NO_PARTS: Final = "ended early, and the server cannot continue it"
@@ -177,7 +177,7 @@ class _RemoteFile(FarFile):
         self._options = {"if_match": tag} if tag and not tag.startswith("W/") else {}
         place.traffic.total = self._size
         self._parts: list[_Part] = []
-        """Parts that were read or skipped, followed by those that are expected."""
+        """Parts that were read or skipped, and after them the expected parts."""
         self._next = 0
         """The position of the first expected part."""
 
@@ -214,7 +214,7 @@ class _RemoteFile(FarFile):
         self._read_ahead()
 
     def _read_ahead(self) -> None:
-        """Forget parts that were passed long ago, and ask for those that are expected soon."""
+        """Forget parts that were passed long ago, and ask for parts that are expected soon."""
         del self._parts[: max(self._next - AT_ONCE, 0)]
         self._next = min(self._next, AT_ONCE)
         for part in self._parts[: self._next + AT_ONCE]:
@@ -227,7 +227,8 @@ class _RemoteFile(FarFile):
             part = self._parts[place]
             self._next = max(self._next, place + 1)
         else:
-            # The file's end is read at once, and a byte more, as a chunk's last one is read alone.
+            # The end of the file, and one byte more, is read at once: a chunk's last byte is read
+            # alone.
             first, last = min(begin, max(self._size - TAIL, 0)), max(end + 1, begin + PART)
             part = self._parts.pop(place) if place >= 0 else _Part(first, min(last, self._size))
             if part.end - part.begin <= PIECE:
@@ -354,7 +355,7 @@ def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: 
 
 
 def _wait_for(url: str, answer: Future[Answer]) -> Answer:
-    """Wait for the answer of a thread, whose errors are those of `_ask`."""
+    """Wait for the answer of a thread; its errors are the errors of `_ask`."""
     # The wait is divided, as a signal that another thread receives does not end one long wait.
     while not wait([answer], _POLL_S).done:
         pass

@@ -36,10 +36,6 @@ AXES: Final = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """The rotation from ahead, left and up to a camera's right, down and forward."""
 
 
-class GroundError(RoadevalError):
-    """Settings or facts of a camera that make no ground."""
-
-
 @dataclass(frozen=True)
 class Ground:
     """Flat ground, and a camera over it."""
@@ -102,12 +98,12 @@ class Ground:
     def moved(self, pitch: float = 0.0, height: float = 0.0) -> Ground:
         """Return the ground for a camera turned down by degrees and raised by metres.
 
-        A `GroundError` if the camera's place and angles are unknown.
+        A `RoadevalError` if the camera's place and angles are unknown.
         """
         if not (pitch or height):
             return self
         if not self.is_posed:
-            raise GroundError("a homography alone does not tell the camera's height and angles")
+            raise RoadevalError("a homography alone does not tell the camera's height and angles")
         turn, origin = self.axes()
         at = -turn.T @ origin
         at[2] += height
@@ -190,7 +186,7 @@ def ground_of(
 
     ``logged`` is the calibration in the log, for images of ``size``; ``settings`` replace parts of
     it. The text is empty if there is neither. Only a roll of 0 is assumed, which the text says. A
-    `GroundError` if the settings are no possible camera.
+    `RoadevalError` if the settings are no possible camera.
     """
     if size is None or (logged is None and not settings.given):
         return None, ""
@@ -241,10 +237,10 @@ def _find_lens(
         return None, Sentence("the focal length is missing: give fov, or focal, with {ground}")
     if problem := lens.problem:
         setting = f"ground.{problem.split()[0]}"
-        raise GroundError(f"impossible for a camera: its {problem}", setting=setting)
+        raise RoadevalError(f"impossible for a camera: its {problem}", setting=setting)
     if not lens.has_shape(*size):
         shapes = f"{lens.width}x{lens.height}, but the log's images are {size[0]}x{size[1]}"
-        raise GroundError(f"the calibration is for images of {shapes}", setting="ground.size")
+        raise RoadevalError(f"the calibration is for images of {shapes}", setting="ground.size")
     last = max((n for n, number in enumerate(lens.distortion, 1) if number), default=0)
     model = lens.model.strip().lower()
     length = next((count for count in COEFFICIENTS.get(model, ()) if count >= last), None)
@@ -263,7 +259,7 @@ def _find_plane(
     if settings.homography:
         to_ground = np.reshape(settings.homography, (3, 3))
         if not np.isfinite(to_ground).all() or not np.linalg.cond(to_ground) < 1e13:
-            raise GroundError("cannot be inverted", setting="ground.homography")
+            raise RoadevalError("cannot be inverted", setting="ground.homography")
         matrix = np.eye(3) if lens is None else np.reshape(lens.matrix, (3, 3))
         from_ground = np.linalg.inv(to_ground @ matrix)
         # Distant places ahead must lie before the camera, not behind it.

@@ -101,7 +101,7 @@ def pack(
 
 _PACKAGE: Final = Path(__file__).parents[1]
 _PLACES: Final = (_PACKAGE / "demo.mcap", _PACKAGE.parent / "recordings" / "demo.mcap")
-"""Where the drive is: in an installation, and in a checkout (see ``setup.py``)."""
+"""The places of the drive: in an installation, and in a checkout (see ``setup.py``)."""
 
 
 def demo(output: AnyPath) -> Path:

@@ -32,7 +32,7 @@ class Outputs:
     """The files and folders of a run."""
 
     recording: Path | None
-    """None where nothing is recorded."""
+    """It is None if nothing is recorded."""
     reports: Path
     """The folder of tables and figures."""
     mcap: Path | None

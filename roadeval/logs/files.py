@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from itertools import takewhile
 from pathlib import Path
@@ -91,36 +91,32 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     files = [file for file in there if file not in problems]
     if not files:
         raise LogError(str(damage[0]) if damage else _describe_folder(path), where=path)
-    expected = {*_missing_numbers(there), *_files_in_metadata(path, {*there})}
-    lacking = sorted(expected - {*there}, key=natural)
+    lacking = sorted(_expected_files(path, there) - {*there}, key=natural)
     unnamed = "the file is not called *.mcap"
     return files, [*damage, *(Damage(file, 0, _problem(file) or unnamed) for file in lacking)]
 
 
-def _missing_numbers(files: Sequence[Path]) -> Iterator[Path]:
-    """Yield the files that are missing among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
-    for pattern, name_of in _NUMBERED:
-        matches = [match for file in files if (match := pattern.fullmatch(file.name))]
-        numbers = {int(match["number"]) for match in matches}
-        names = {match["name"] for match in matches}
-        is_numbered = len(names) == 1 and len(matches) == len(files) and 0 in numbers
-        if is_numbered and max(numbers) < 2 * len(files):
-            for number in sorted({*range(max(numbers))} - numbers):
-                yield files[0].with_name(name_of.format(name=matches[0]["name"], number=number))
-
-
-def _files_in_metadata(folder: Path, there: Set[Path]) -> set[Path]:
-    """Return the files of the log that the recorder's `METADATA` lists.
+def _expected_files(folder: Path, there: Sequence[Path]) -> set[Path]:
+    """Return the files of a log by the numbers in their names, and by the recorder's `METADATA`.
 
     A list without any file that is ``there`` describes another log, and is left out.
     """
+    expected = set[Path]()
+    for pattern, name_of in _NUMBERED:  # NAME_0.mcap, NAME_1.mcap and so on
+        matches = [match for file in there if (match := pattern.fullmatch(file.name))]
+        numbers = {int(match["number"]) for match in matches}
+        log_names = {match["name"] for match in matches}
+        is_numbered = len(log_names) == 1 and len(matches) == len(there) and 0 in numbers
+        if is_numbered and max(numbers) < 2 * len(there):
+            for number in {*range(max(numbers))} - numbers:
+                expected.add(folder / name_of.format(name=matches[0]["name"], number=number))
     block = None
     with suppress(OSError), (folder / METADATA).open("rb") as file:
         block = _LIST.search(file.read(16 << 20).decode(errors="replace"))  # 100,000 files
     names = [] if block is None else _ITEM.findall(block[1])
     # Earlier recorders wrote the folder before the name.
     files = {folder / Path(name.strip(" \r'\"")).name for name in names}
-    return files if files & there else set()
+    return expected | files if files & {*there} else expected
 
 
 def _problem(path: Path) -> str:

@@ -137,18 +137,6 @@ def _numbers(
                 yield f"/facts/{mask}/{name}", (value,)
 
 
-def _rates_in_words(result: FrameResult, layout: Layout) -> Iterator[tuple[str, str]]:
-    """Yield the rates of each variant's final mask by entity path."""
-    finals = {(variant.name, variant.stages[-1]): variant.name for variant in layout.variants}
-    rates = {name: "not scored" for name in finals.values() if layout.has_truth}
-    for tally in result.tallies:
-        if name := finals.get((tally.variant, tally.stage)):
-            lines = (f"{rate} {percent(tally.rates[rate])} %" for rate in SHORT)
-            rates[name] = "\n".join(lines)
-    for name, text in rates.items():
-        yield f"{at.FRAME_RATES}/{name}", f"This frame:\n{text}"
-
-
 def worst_error(result: FrameResult, layout: Layout) -> float:
     """Return the error rate of the focus's final mask; -1 for a frame not evaluated.
 
@@ -331,6 +319,13 @@ class Recorder:
         level = "WARN" if set(health.values()) - {Health.OK} else "INFO"
         images = _encode_images(result, camera, kinds) if kinds else ()
         numbers = _numbers(result, camera.layout.rates)
+        finals = {(v.name, v.stages[-1]): v.name for v in camera.layout.variants}
+        rates = {name: "not scored" for name in finals.values() if camera.layout.has_truth}
+        for tally in result.tallies:
+            if name := finals.get((tally.variant, tally.stage)):
+                lines = (f"{rate} {percent(tally.rates[rate])} %" for rate in SHORT)
+                rates[name] = "\n".join(lines)
+        texts = {f"{at.FRAME_RATES}/{name}": f"This frame:\n{text}" for name, text in rates.items()}
         return EncodedFrame(
             (frame.number, frame.stamp_ns, frame.log_time_ns),
             camera.prefix,
@@ -338,7 +333,7 @@ class Recorder:
             {camera.prefix + path: values for path, values in numbers},
             {camera.prefix + path: state for path, state in states.items()},
             tuple((note, level) for note in result.notes),
-            {camera.prefix + path: text for path, text in _rates_in_words(result, camera.layout)},
+            {camera.prefix + path: text for path, text in texts.items()},
             error,
         )
 

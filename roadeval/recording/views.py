@@ -215,37 +215,25 @@ def overview(layout: Layout) -> BlueprintPart:
         paths = [f"{at.PERCENT}/{final}/{rate}" for final in finals]
         graphs.append(plot(f"{rate}, %: {SHORT[rate].in_words}", paths))
     graphs += [] if aside else [_events()]
+    parts = [rrb.Horizontal(*pictures, document(at.GUIDE, "What you see"))]
+    # Rows are filled from the right, so that equal phases are aligned. Their titles must be short:
+    # they are the layers' names.
+    for name, cells in rows.items():
+        views = [layers(" + ".join(spec.name for spec in cell), name, cell) for cell in cells]
+        space, header = _PICTURE * (columns - len(cells)), document(f"{at.GUIDE}/{name}")
+        if layout.has_truth:
+            header = rrb.Vertical(header, document(f"{at.FRAME_RATES}/{name}"), row_shares=[8, 5])
+        start, shares = [header], [_HEADER + space]
+        if name in aside:
+            start, shares = [aside[name], header], [space, _HEADER]
+        shares += [_PICTURE] * len(cells)
+        parts.append(rrb.Horizontal(*start, *views, column_shares=shares))
     return rrb.Vertical(
-        rrb.Horizontal(*pictures, document(at.GUIDE, "What you see")),
-        *(
-            _row(name, cells, columns, aside.get(name), has_truth=layout.has_truth)
-            for name, cells in rows.items()
-        ),
+        *parts,
         rrb.Horizontal(*graphs),
         row_shares=[_TOP, *[_ROW] * len(rows), _BOTTOM],
         name="Overview",
     )
-
-
-def _row(
-    variant: str,
-    cells: Sequence[Cell],
-    columns: int,
-    aside: BlueprintPart | None,
-    *,
-    has_truth: bool,
-) -> BlueprintPart:
-    """Return a variant's row, filled from the right so that equal phases are aligned.
-
-    The part ``aside`` stands to the left of a short row, before its header.
-    """
-    # Titles must be short here: the layers' names.
-    pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
-    header, space = document(f"{at.GUIDE}/{variant}"), _PICTURE * (columns - len(cells))
-    if has_truth:
-        header = rrb.Vertical(header, document(f"{at.FRAME_RATES}/{variant}"), row_shares=[8, 5])
-    start, shares = ([aside, header], [space, _HEADER]) if aside else ([header], [_HEADER + space])
-    return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[_PICTURE] * len(cells)])
 
 
 def picture(title: str, *paths: str) -> BlueprintPart:

@@ -100,7 +100,7 @@ def write_figures(
     The folder is made if it is missing. ``windows`` are the rows of ``windows.csv``, of any number
     of variants, or no rows without truth; ``examples`` are a few frames for figure 2; ``camera`` is
     the name of a camera of a rig, for titles and file names. Figures are ``width`` inches across.
-    An OSError if the folder cannot be made; a `ReportError` if a file, or the system's folder for
+    An OSError if the folder cannot be made; a `RoadevalError` if a file, or the system's folder for
     temporary files, cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)

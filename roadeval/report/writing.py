@@ -8,16 +8,16 @@ from pathlib import Path
 
 from roadeval.errors import RoadevalError
 from roadeval.report.blocks import Report
-from roadeval.report.pdf.typeset import ReportError, typeset
+from roadeval.report.pdf.typeset import typeset
 from roadeval.runtime.files import put, writing
 
 
 def write_file(path: Path, content: bytes) -> Path:
     """Write a file and return its path; an incomplete file never has the name.
 
-    A `ReportError` if it cannot be written.
+    A `RoadevalError` if it cannot be written.
     """
-    with writing(path, partial(ReportError, remedy="choose another place")):
+    with writing(path, partial(RoadevalError, remedy="choose another place")):
         put(path, content)
     return path
 

@@ -42,9 +42,9 @@ def condition_of(judgement: Judgement) -> dict[str, Any]:
 
 
 def changed_settings(comparison: Comparison, most: int | None = None) -> list[str]:
-    """Return a line for each new result on the settings that differ from the base's.
+    """Return a line for each new result on the settings in which it differs from the base.
 
-    ``most`` is the number of settings to name; all by default.
+    ``most`` limits the number of settings that are named; by default all are named.
     """
     lines = []
     for label, settings in comparison.changed_settings.items():
@@ -53,8 +53,8 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
         pairs = [(name, *map(setting, settings[name])) for name in names]
         named = [f"{name} {before} to {after}" for name, before, after in pairs]
         more = f"; and {len(named) - most} more" if most and len(named) > most else ""
-        of = f" in {label}" if len(comparison.results) > 2 else ""
-        lines.append(f"Changed settings{of}: {'; '.join(named[:most])}{more}.")
+        suffix = f" in {label}" if len(comparison.results) > 2 else ""
+        lines.append(f"Changed settings{suffix}: {'; '.join(named[:most])}{more}.")
     return lines
 
 
@@ -77,8 +77,8 @@ def unchanged(comparison: Comparison, masks: Iterable[MaskChange]) -> Iterator[s
     base = comparison.results[0].label
     for result, rows in groupby(masks, lambda row: row.result):
         names = dict.fromkeys(row.variant for row in rows)
-        of = "" if [*names] == [result] else f" of {result}"
-        yield f"{listing([*names])}{of}: every frame as in {base}."
+        suffix = "" if [*names] == [result] else f" of {result}"
+        yield f"{listing([*names])}{suffix}: every frame as in {base}."
 
 
 def where(comparison: Comparison) -> list[str]:
@@ -125,8 +125,8 @@ def why_unsure(differences: Iterable[Difference]) -> str:
         return ""
     if reasons := {change.none_because for change in changes if change.low is None} - {""}:
         return f"no interval, as {listing(sorted(reasons))}"
-    alone = [change for change in changes if is_sure(replace(change, p_holm=None))]
-    counts = [change.comparisons for change in alone if change.comparisons]
+    uncorrected = [change for change in changes if is_sure(replace(change, p_holm=None))]
+    counts = [change.comparisons for change in uncorrected if change.comparisons]
     family = f", as {max(counts)} regions are compared" if counts else ""
     return f"each change may be chance{family}"
 
@@ -136,7 +136,7 @@ def _mask_name(result: str, variant: str) -> str:
 
 
 def changed_drives(comparison: Comparison) -> list[str]:
-    """Return a line for each final mask: on how many drives it changed, in which direction."""
+    """Return a line for each final mask: on how many drives it changed, and in which direction."""
     lines = []
     for mask in dict.fromkeys((row.result, row.variant) for row in comparison.drives):
         drives = [row for row in comparison.drives if (row.result, row.variant) == mask]
@@ -169,7 +169,7 @@ def describe_judgement(judgement: Judgement) -> str:
 
 
 def headline(holds: Sequence[bool | None]) -> str:
-    """Return whether all limits were kept; ``holds`` are as of `Judgement.holds`."""
+    """Return whether all limits were kept; ``holds`` has the values of `Judgement.holds`."""
     if all(exceeded is False for exceeded in holds):
         return f"passed, {len(holds)} limit{'s' * (len(holds) > 1)} kept"
     counts = {"exceeded": holds.count(True), "not judged": holds.count(None)}

@@ -1,7 +1,7 @@
 """The facts of a result: ``summary.json`` of a drive, ``fleet.json`` of many drives.
 
-Both are read into one tree of types, which is checked, and written from it. ``digest`` is a
-checksum of the parts that are results, so a changed number is damage.
+Each file is read into a tree of types, which is checked, and is written from that tree. ``digest``
+is a checksum of the parts that are results, so a changed number is damage.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from roadeval.runtime.text import elide, visible, visible_lines
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; it is written last."""
+ADAPTER_OF: Final = cache(TypeAdapter)
 FETCHED: Final[dict[Path, str]] = {}
 """Public URLs of results that were fetched, by their paths."""
 
@@ -44,8 +45,8 @@ FETCHED: Final[dict[Path, str]] = {}
 def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
     """Return the variant that a result is about: the chosen one, else the first that was brought.
 
-    If the user brought none, it is the first one; None if there is no variant. A `RoadevalError`
-    if the chosen one is not there.
+    If the user brought no variant, it is the first one; None if there is no variant. A
+    `RoadevalError` if the chosen one is not there.
 
     >>> focus_of(["filtered", "unfiltered", "mine", "mine_tuned", "blind"])
     'mine'
@@ -54,9 +55,9 @@ def focus_of(variants: Iterable[str], chosen: str | None = None) -> str | None:
     """
     names = [name for name in variants if name != BASELINE]
     if chosen and chosen not in names:
-        there = f"there {'are' if len(names) > 1 else 'is'} {listing(names) or 'none'}"
+        choices = f"there {'are' if len(names) > 1 else 'is'} {listing(names) or 'none'}"
         likely = get_close_matches(chosen, names, 1)
-        remedy = f"did you mean {likely[0]}? {there.capitalize()}" if likely else there
+        remedy = f"did you mean {likely[0]}? {choices.capitalize()}" if likely else choices
         raise RoadevalError(f"there is no variant {chosen}", setting="output.focus", remedy=remedy)
     brought = [name for name in names if name not in (FILTERED, UNFILTERED)]
     return chosen or next(iter([*brought, *names]), None)
@@ -82,7 +83,7 @@ class DriveFacts:
     topics: list[str] = field(default_factory=list)
     calibration: Calibration | None = None
     ground: Ground | None = None
-    """The camera's calibration and the ground before it, for images of this size."""
+    """The camera's calibration and the ground in front of it, for images of this size."""
 
 
 @dataclass(frozen=True)
@@ -255,7 +256,7 @@ class FactsFile:
             raise cls._damage(where, error) from error
         check_format(content, cls.FORMAT, where)
         try:
-            facts: Self = _adapter(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
+            facts: Self = ADAPTER_OF(cls).validate_python(cls.read_content(content))  # type: ignore[arg-type]
         except ValidationError as error:
             wrong = [e["loc"][0] for e in error.errors(include_url=False, include_input=False)]
             part = next((name for name in wrong if name in content), wrong[0])
@@ -281,7 +282,7 @@ class FactsFile:
 
     @property
     def evaluation(self) -> EvaluationSettings:
-        """The settings of the evaluation, by default those of this version.
+        """The settings of the evaluation, by default the settings of this version.
 
         A `ResultsError` if they are damaged.
         """
@@ -306,7 +307,7 @@ class Facts(FactsFile):
     drive: DriveFacts
     frames: FrameAccount
     totals: Totals
-    """Empty if nothing was scored."""
+    """It is empty if nothing was scored."""
     beyond: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Numbers of each final mask beyond its rates: edges, flicker, error episodes."""
     curves: Totals = field(default_factory=dict)
@@ -350,11 +351,11 @@ class Facts(FactsFile):
     """Facts that stages state about themselves, as networks do."""
     versions: dict[str, str] = field(default_factory=dict)
     unlabelled: UnlabelledFacts | None = None
-    """None if every frame has truth."""
+    """It is None if every frame has truth."""
     estimate: EstimateFacts | None = None
     """Rates of the whole drive, if picked frames are the truth."""
     log: LogFacts | None = None
-    """None after a run that ended early."""
+    """It is None after a run that ended early."""
     masks: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Labels that are not in the log: masks of other systems by their variant, and ``truth``."""
     tables: dict[str, TableFacts] = field(default_factory=dict)
@@ -363,7 +364,7 @@ class Facts(FactsFile):
     cameras: dict[str, Facts] = field(default_factory=dict)
     """The facts of each camera of a rig, by its name."""
     origin: Origin | None = None
-    """None in older results, and in a recording, which does not state its time."""
+    """It is None in older results, and in a recording, which does not state its time."""
 
     FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
     AGAIN = "make it again with roadeval replay"
@@ -481,13 +482,13 @@ class FleetFacts(FactsFile):
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
     misfits: list[str] = field(default_factory=list)
-    """Sentences on drives whose truth or masks do not fit; the verdict begins with them."""
+    """Sentences on drives with truth or masks that do not fit; the verdict begins with them."""
     disturbances: Degradations = field(default_factory=dict)
     """ERR of final masks on disturbed frames, over drives."""
     why: dict[str, list[Reason]] = field(default_factory=dict)
-    """As in `Facts`."""
+    """The reasons are as in `Facts`."""
     slices: dict[str, list[Slice]] = field(default_factory=dict)
-    """As in `Facts`, over groups of drives."""
+    """The slices are as in `Facts`, over groups of drives."""
     origin: Origin | None = None
     """The origin of the last run; None in older results."""
 
@@ -503,11 +504,6 @@ class FleetFacts(FactsFile):
 def is_fleet(path: str | Path) -> bool:
     """Return whether a path leads to a fleet's folder."""
     return (Path(path) / FLEET).is_file()
-
-
-@cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
 
 
 def check_format(content: Any, form: Mapping[str, Any], where: object) -> None:

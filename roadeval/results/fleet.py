@@ -1,9 +1,9 @@
 """A fleet's folder: the results folders of its drives, and a cache of their tables in Parquet.
 
-Beside a drive's results lies a file that says how they were made; it is written last. A drive is
-done if that file exists and names the same log, settings, model and version. The frames of each
-drive, and the scores that follow from them, are cached. If a cache is missing or old, it is made
-again from the results.
+A file beside a drive's results says how they were made; it is written last. A drive is done if that
+file exists and names the same log, settings, model and version. The frames of each drive, and the
+scores that follow from them, are cached. If a cache is missing or old, it is made again from the
+results.
 """
 
 from __future__ import annotations
@@ -71,19 +71,19 @@ if TYPE_CHECKING:
 WRITTEN: Final = (*OF_DRIVES, "classes")
 """The tables of all drives in one file; older fleets have no ``classes``."""
 FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
-"""The files of a fleet's folder; beside them lie folders with the files of its drives."""
+"""The files of a fleet's folder; folders beside them have the files of its drives."""
 RESULTS: Final = "results"
 PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
 """Number of frames in the table of the worst."""
 OF_A_DRIVE: Final = 3
-"""Frames of a drive that are among its worst, at most."""
+"""Greatest number of frames of a drive that are among its worst."""
 APART_NS: Final = 3_000_000_000
-"""Neighbours fail alike: of frames that are closer than this only the worst counts."""
+"""Neighbouring frames fail alike: if frames are closer than this, only the worst one counts."""
 CACHED: Final = ("frames", "regions", "scores", "worst", "classes")
-"""Tables of each drive that are cached in folders of these names; ``regions`` of final masks. Older
-fleets have no ``classes``."""
+"""Tables of each drive that are cached in folders of these names. ``regions`` has the rows of final
+masks. Older fleets have no ``classes``."""
 
 
 def results_path(folder: Path, drive: str) -> Path:
@@ -142,7 +142,7 @@ class Made(FactsFile):
     RESULTS = ("drive", "asked", "stamp", "results", "problem")
 
     def write(self, folder: Path) -> None:
-        """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
+        """Write the file into a fleet's folder as a whole; an OSError if that fails."""
         summary = "" if self.problem else sha256_of(results_path(folder, self.drive) / SUMMARY)
         content = json.dumps(replace(self, results=summary).as_dict(), allow_nan=False)
         put(made_path(folder, self.drive), content.encode())
@@ -155,7 +155,7 @@ def read_made(folder: Path, drive: str) -> Made | None:
         made = Made.parse(read_bounded(path), path)
         summary = "" if made.problem else sha256_of(results_path(folder, drive) / SUMMARY)
     except (FileNotFoundError, NotADirectoryError, ValueError, ResultsError):
-        return None  # missing, of another version, or incomplete: it is made again
+        return None  # the results are missing, old or incomplete
     except OSError as error:
         raise ResultsError(f"{path}: {error.strerror}") from error
     return made if (made.drive, made.results) == (drive, summary) else None
@@ -187,9 +187,9 @@ class FleetFolder:
     def table(self, name: str, drives: Collection[str] | None = None) -> pd.DataFrame:
         """Read a table of all drives, or of some of them.
 
-        The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and those of
-        `CACHED` of each drive; others are read from the drives' results. ``regions`` has the rows
-        of final masks.
+        The tables `roadeval.results.schema.OF_DRIVES` are files of the folder, and so are the
+        tables `CACHED` of each drive; others are read from the drives' results. ``regions`` has the
+        rows of final masks.
         """
         if name in OF_DRIVES or (self.has_classes and name == "classes"):
             rows = read_parquet([self.path / f"{name}.parquet"], name)
@@ -291,8 +291,8 @@ class FleetFolder:
 def rank_worst(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of ``worst`` with the highest ERR over all drives, with their ranks."""
     order = {TESTED: False, "drive": True, "frame": True}
-    words = rows.astype({"drive": "str"})
-    ranked = words.sort_values([*order], ascending=[*order.values()]).head(WORST)
+    with_texts = rows.astype({"drive": "str"})
+    ranked = with_texts.sort_values([*order], ascending=[*order.values()]).head(WORST)
     return ranked.assign(rank=np.arange(1, len(ranked) + 1))
 
 
@@ -360,7 +360,7 @@ class FleetWriter:
         with writing(self.folder, ResultsError):
             check_output(self.folder, folder=True)
             if is_fleet(self.folder):
-                with suppress(ValueError):  # damage: it is written again
+                with suppress(ValueError):  # a damaged file is written again
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
             elif not (self.folder / RESULTS).is_dir() and any(self.folder.glob("*")):
@@ -384,8 +384,8 @@ class FleetWriter:
         """Write the tables of all drives and the facts that follow from them.
 
         ``members`` are in the order of the tables. ``run`` and ``run_toml`` are the configuration
-        of the fleet, as plain data and as a text. ``asked`` are the digests of `Made.asked` that
-        drives must have; any by default.
+        of the fleet, as plain data and as a text. ``asked`` has the accepted values of
+        `Made.asked`; by default all are accepted.
         """
         # Two commands may replay drives of one folder together.
         with (
@@ -415,42 +415,42 @@ class FleetWriter:
         for member in members:
             self._add(member, self._read_made(member.drive, digests), rows)
         try:
-            made = self._read_cache(rows["cached"])
-        except ResultsError:  # damaged: the cache is made anew
+            cached = self._read_cache(rows["cached"])
+        except ResultsError:  # a damaged cache is made again
             for name in CACHED:
                 shutil.rmtree(check_inside(self.folder / name, self.folder), ignore_errors=True)
-            made = self._read_cache(rows["cached"], again=True)
-        made["drives"] = table_of("drives", rows["drives"], tags)
-        made["effects"] = table_of("effects", rows["effects"])
-        made["worst"] = rank_worst(made["worst"])
-        made["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
-        write_parquet({self.folder / f"{name}.parquet": (name, made[name]) for name in WRITTEN})
+            cached = self._read_cache(rows["cached"], again=True)
+        cached["drives"] = table_of("drives", rows["drives"], tags)
+        cached["effects"] = table_of("effects", rows["effects"])
+        cached["worst"] = rank_worst(cached["worst"])
+        cached["classes"] = table_of_drives(self.folder, "classes", rows["cached"])
+        write_parquet({self.folder / f"{name}.parquet": (name, cached[name]) for name in WRITTEN})
         finals = {
-            "drives": made["drives"],
-            "scores": only(made["scores"], final=True, region=ALL),
-            "effects": only(made["effects"], final=True),
+            "drives": cached["drives"],
+            "scores": only(cached["scores"], final=True, region=ALL),
+            "effects": only(cached["effects"], final=True),
         }
         within = rows["within"] if len(finals["effects"]["drive"].unique()) == 1 else []
         return finals, within, dict(rows["disturbed"])
 
     def _add(self, member: Member, made: Made, rows: Mapping[str, list[Any]]) -> None:
-        """Add a drive's rows to those of each table."""
-        how: dict[str, Any] = {"drive": member.drive, "name": member.name, "source": member.source}
-        how |= {"group": member.group, "fold": made.fold, "model": made.model, "camera": ""}
-        how |= {f"{TAG}{key}": value for key, value in member.tags.items()}
+        """Add a drive's rows to the rows of each table."""
+        row: dict[str, Any] = {"drive": member.drive, "name": member.name, "source": member.source}
+        row |= {"group": member.group, "fold": made.fold, "model": made.model, "camera": ""}
+        row |= {f"{TAG}{key}": value for key, value in member.tags.items()}
         if made.problem:
             failure = {"status": FAILED, "reason": made.problem, "exit_code": made.exit_code}
-            rows["drives"].append({**how, **failure})
+            rows["drives"].append({**row, **failure})
             return
         facts = Facts.read(results_path(self.folder, member.drive) / SUMMARY)
         key = Key(member.drive, visible(facts.drive.camera))
-        how |= {"camera": key.camera, "seconds": made.seconds}
+        row |= {"camera": key.camera, "seconds": made.seconds}
         rows["effects"] += effect_rows(facts, key)
         rows["within"] += facts.final_effects
         rows["disturbed"] += [(member.drive, facts.disturbances)] if facts.disturbances else []
         if facts.frames.evaluated:
             rows["cached"].append(member.drive)
-        rows["drives"].append({**drive_row(facts, member.name, member.source), **how})
+        rows["drives"].append({**drive_row(facts, member.name, member.source), **row})
 
     def _read_cache(self, drives: Sequence[str], *, again: bool = False) -> dict[str, pd.DataFrame]:
         """Return the cached sums of drives; make missing and old ones from their results."""
@@ -469,7 +469,7 @@ class FleetWriter:
         }
 
     def _read_made(self, drive: str, digests: Mapping[str, str]) -> Made:
-        """Return how a drive's results were made; an error if they are gone, or other ones."""
+        """Return how a drive's results were made; an error if they are missing or were replaced."""
         made = read_made(self.folder, drive)
         if made is None:
             raise ResultsError(

@@ -1,6 +1,7 @@
 """The results folder: tables and summary as plain files.
 
-It is built beside the one of its name, and replaces it as one: see `roadeval.runtime.files`.
+A new folder is built beside the earlier one and replaces it in one step, see
+`roadeval.runtime.files`.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class ResultsWriter:
 
     @property
     def folder(self) -> Path:
-        """The folder of the files until the end, for others who write there, as figures are."""
+        """The folder of the files until the end; figures are written there, too."""
         return self._new.partial
 
     def __enter__(self) -> Self:

@@ -17,7 +17,7 @@ from roadeval.results.sentences import is_sure
 
 FORMAT: Final = {"name": "roadeval-history", "version": 1}
 DRIVES: Final = 20
-"""Drives of a change in the JSON file, those that changed most."""
+"""Greatest number of drives of a change in the JSON file; they are the drives that changed most."""
 NEAR: Final = 2
 """Greatest number of runs between steps of noisy lines that are one event."""
 EXACT: Final = 1e-4
@@ -31,7 +31,7 @@ class RunFacts:
     paths: tuple[str, ...]
     origin: Origin
     title: str
-    """When it was made, or the label."""
+    """The time at which it was made, or the label."""
     drives: int = 0
     frames: int = 0
     """Scored drives, and evaluated frames."""
@@ -45,7 +45,7 @@ class RunFacts:
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """The changes of one run, the most telling first."""
+    """The changes of one run; the most telling change comes first."""
 
     run: int
     before: int
@@ -80,7 +80,7 @@ class History:
         events = []
         for event in self.events:
             line, step = event.first.line, event.first.step
-            # Steps tell it: single runs are noisy, and the last one may have no level.
+            # Steps decide this, because single runs are noisy, and the last one may have no level.
             since = sum(s.change for s in line.steps if s.run >= step.run and s.kind != "outlier")
             is_level = (line.title, line.variant) == (TESTED, self.focus) and step.kind != "outlier"
             if is_level and event.first.difference.mean > 0 and since > step.change / 2:
@@ -97,7 +97,7 @@ class History:
 def group_changes(changes: Sequence[LineChange], focus: str) -> list[Event]:
     """Return the changes of each run as one event, in which ERR of the focus comes first.
 
-    A step of a noisy line may be found some runs early or late: near ones belong together.
+    The step of a noisy line may be found some runs early or late, so near steps are one event.
     """
     events: list[Event] = []
 
@@ -134,7 +134,7 @@ def describe_change(change: LineChange, when: str = "") -> str:
 
 
 def verdict(history: History) -> str:
-    """Return since when the focus is worse; else its last change, or that there was none."""
+    """Return since when the focus is worse, or else its last change, or that nothing changed."""
     count, focus = counted(len(history.runs), "run"), history.focus
     of_focus = [event for event in history.events if event.first.line.variant == focus]
     if not of_focus:

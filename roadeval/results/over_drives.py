@@ -55,8 +55,8 @@ def summarise(
 
     ``tables`` are ``drives``, and the rows of ``scores`` and ``effects`` of final masks on all
     pixels. ``within_one`` are the differences within the drive if only one was scored;
-    ``disturbances`` those of each drive. ``read`` reads a table of some drives, in which slices are
-    searched.
+    ``disturbances`` has the degradations of each drive. ``read`` reads a table of some drives, in
+    which slices are searched.
     """
     drives, scores, effects = (tables[name] for name in ("drives", "scores", "effects"))
     rows = records(drives)
@@ -91,7 +91,7 @@ def summarise(
         totals=_totals(scores),
         effects=differences,
         strata=parts,
-        warnings=[*_warnings_of_copies(copies, cameras), *_warnings_of_drives(rows)],
+        warnings=[*_warnings(copies, cameras, rows)],
         run=run,
         misfits=[*_misfits(rows)],
         disturbances=_degradations(disturbances or {}, groups, settings.confidence),
@@ -136,17 +136,17 @@ def slices_over_drives(
     groups: Mapping[str, str],
     confidence: float,
 ) -> dict[str, list[Slice]]:
-    """Return the slices of each final mask; nothing with too few groups of drives.
+    """Return the slices of each final mask; there are none with too few groups of drives.
 
-    Every drive counts the same. Beside measured quantities there are tags and times: in the drive,
-    and of the day if the stamps are of this century.
+    Every drive counts the same. Conditions are measured quantities, tags, the time since the
+    drive's start, and the time of day if the stamps are of this century.
     """
     scored = drives["drive"][drives["evaluated"].fillna(0) > 0].tolist()
     if len({groups[drive] for drive in scored}) < 2 * LEAST_GROUPS:
         return {}
     names = ("conditions", "frames", "regions", "parts")
     conditions, frames, regions, parts = (read(name, scored) for name in names)
-    if not len(conditions):  # made before they were measured
+    if not len(conditions):  # older results lack them
         return {}
     stamps = conditions["stamp_ns"]
     starts = stamps.groupby(conditions["drive"], observed=True).transform("min")
@@ -181,10 +181,15 @@ def _totals(scores: pd.DataFrame) -> Totals:
     return {name: rows.droplevel("variant").to_dict("index") for name, rows in by_variant}
 
 
-def _warnings_of_copies(
-    originals: Mapping[str, str], cameras: Mapping[str, str | None]
+def _warnings(
+    originals: Mapping[str, str],
+    cameras: Mapping[str, str | None],
+    drives: Sequence[Mapping[str, Any]],
 ) -> Iterator[str]:
-    """Yield how drives of the same log are counted: copies, or cameras of a rig."""
+    """Yield how drives of the same log are counted, and the warnings of the drives.
+
+    Warnings that differ only by numbers are one.
+    """
     copies = {copy: of for copy, of in originals.items() if cameras[copy] == cameras[of]}
     if len(originals) > len(copies):
         yield "in differences the cameras of a log are averaged to one drive"
@@ -196,28 +201,24 @@ def _warnings_of_copies(
             f"{copy} is a copy of {of}{more}: differences count copies as one "
             "drive, the means of rates do not"
         )
+    by_text: dict[str, list[tuple[str, str]]] = {}
+    for row in drives:
+        for sentence in (row["warnings"] or "").splitlines():
+            by_text.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
+    ranked = sorted(by_text.values(), key=lambda warnings: -len(warnings))
+    for (drive, sentence), *others in ranked[:WARNINGS]:
+        more = f" (and {len(others)} more alike)" if others else ""
+        yield f"{drive}{more}: {sentence}"
+    if len(ranked) > WARNINGS:
+        yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"
 
 
 def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield a sentence on the drives where truth or masks do not fit the images."""
     rows = [row for row in drives if row["misfits"]]
     if rows:
-        named = listing([row["drive"] for row in rows[:WARNINGS]])
+        names = listing([row["drive"] for row in rows[:WARNINGS]])
         more = f" and {len(rows) - WARNINGS} more" if len(rows) > WARNINGS else ""
         first = rows[0]["misfits"].splitlines()[0]
-        where = f"{len(rows)} of {len(drives)} drives ({named}{more})"
+        where = f"{len(rows)} of {len(drives)} drives ({names}{more})"
         yield f"Truth or masks do not fit the images on {where}: {first}"
-
-
-def _warnings_of_drives(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the drives' warnings, together if they differ by numbers only."""
-    alike: dict[str, list[tuple[str, str]]] = {}
-    for row in drives:
-        for sentence in (row["warnings"] or "").splitlines():
-            alike.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
-    ranked = sorted(alike.values(), key=lambda warnings: -len(warnings))
-    for (drive, sentence), *others in ranked[:WARNINGS]:
-        more = f" (and {len(others)} more alike)" if others else ""
-        yield f"{drive}{more}: {sentence}"
-    if len(ranked) > WARNINGS:
-        yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"

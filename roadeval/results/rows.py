@@ -106,10 +106,11 @@ def _numbers(tally: Tally) -> Row:
 def sum_rows(
     board: Scoreboard, windows: pd.DataFrame, classes: Sequence[TruthClass] = ()
 ) -> dict[str, list[Row]]:
-    """Return the rows of each table of sums over the drive; ``classes`` are those of its truth.
+    """Return the rows of tables of sums over the drive; ``classes`` are the classes of its truth.
 
     Levels of probabilities that do not occur are left out, and cells of heat maps that are labelled
-    and have no error. The last cell has a row, as it gives the map's size, if any cell is labelled.
+    and have no error. If any cell is labelled, the last cell has a row, because it tells the map's
+    size.
     """
     heat, probabilities = list[Row](), list[Row]()
     for variant, heat_map in board.heat.items():
@@ -224,7 +225,7 @@ def effect_rows(facts: Facts, key: Key) -> Iterator[dict[str, Any]]:
 def table_of(
     name: str, rows: Iterable[Mapping[str, Any]], tags: Iterable[str] = ()
 ) -> pd.DataFrame:
-    """Return a table of drives from its rows, with its columns and types; None is unknown."""
+    """Return a table of drives from its rows, with its columns and types; None means unknown."""
     import pandas as pd
 
     types = {c.name: TYPES[c.kind].replace("int", "Int") for c in TABLES[name].columns}

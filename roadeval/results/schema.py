@@ -59,16 +59,16 @@ class Column(NamedTuple):
 
 
 LATER: Final = ("truth",)
-"""Columns of counts that the first files of this format lack; they are read as 0, for unknown.
-If any other column is missing, the file is damaged."""
+"""Columns of counts that the first files of this format lack; they are read as 0, which stands for
+unknown. If any other column is missing, the file is damaged."""
 
 
 class TableSchema(NamedTuple):
-    """A table: ``<name>.csv`` in the results of a drive, ``<name>.parquet`` in those of a fleet."""
+    """A table: ``<name>.csv`` in results of a drive, ``<name>.parquet`` in results of a fleet."""
 
     name: str
     doc: str
-    """Describes a row."""
+    """The meaning of a row."""
     columns: tuple[Column, ...]
     """The columns in the order of the file."""
 
@@ -88,7 +88,7 @@ class TableSchema(NamedTuple):
         return ",".join(self.names) + "\n"
 
     def arrow(self) -> pa.Schema:
-        """Return the columns with their Arrow types, including those of a fleet."""
+        """Return the columns with their Arrow types, and a fleet's further columns."""
         import pyarrow as pa
 
         return pa.schema([(c.name, TYPES[c.kind]) for c in (*self.columns, *self.of_a_fleet)])
@@ -374,7 +374,7 @@ TABLES: Final[Mapping[str, TableSchema]] = {
 }
 """Every table by its name."""
 STREAMED: Final = (*_OF_FRAMES,)
-"""The tables whose rows come with each frame; the others of a drive are sums over it."""
+"""The tables that get rows with each frame; other tables of a drive are sums over it."""
 OF_A_DRIVE: Final = (*_OF_FRAMES, *_OF_SUMS)
 """The tables of one drive, in the order in which they are written."""
 OF_DRIVES: Final = (*_OF_DRIVES,)

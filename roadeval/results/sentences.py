@@ -17,9 +17,9 @@ from roadeval.runtime.sentence import Sentence
 FINE: Final = 0.005
 """Levels that differ by less have two digits."""
 ROUNDING: Final = 5e-4
-"""Two levels whose difference is farther from the paired difference are of other frames."""
+"""If the difference of two levels is farther from the paired one, they are of other frames."""
 MARK: Final = "*"
-"""Marks a difference that is significant after correction for all that are shown together."""
+"""The mark of a difference that is significant after correction for all that are shown together."""
 OVERCONFIDENT: Final = 0.01
 """Least difference between errors and stated errors that `describe_overconfidence` reports."""
 
@@ -73,7 +73,7 @@ def marked_interval(difference: Difference) -> str:
 
 
 def correction(differences: Iterable[Difference]) -> str:
-    """Return what a mark on differences of ERR means; empty if none has one."""
+    """Return what a mark on differences of ERR means; empty if none has a mark."""
     marked = list(differences)
     counts = sorted({shown.comparisons for shown in marked if shown.comparisons})
     if not any(map(is_significant, marked)):
@@ -142,7 +142,7 @@ def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
 def notes(finals: Mapping[str, Mapping[str, float]], focus: str | None = None) -> Iterator[str]:
     """Yield notes on a frame for a person, by the rates of final masks.
 
-    With a ``focus`` they are about this variant alone, beside its rates.
+    With a ``focus`` they are about this variant alone, and do not repeat its rates.
     """
     blind = finals.get(BASELINE)
     variants = [name for name in finals if name != BASELINE and focus in (None, name)]

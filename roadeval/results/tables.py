@@ -34,15 +34,15 @@ NAMED: Final = 40
 ROWS: Final = 10_000
 """Rows that a Parquet file of any size may have; more rows need at least a byte each."""
 UNPACKED: Final = 256 << 20
-"""Bytes that a compressed file of any size may unpack to; a larger file may to 100 times its size.
-"""
+"""Bytes that a compressed file of any size may unpack to; a larger file may unpack to 100 times its
+size."""
 COLUMNS: Final = 1_000
 WORDS: Final = 1_000
-"""Different names in a column of a drive's table: variants, stages, regions; ten times as many
-texts, as a class has for each variant."""
+"""Greatest number of different names in a column of a drive's table, such as variants or regions.
+There may be ten times as many texts, because a class has one for each variant."""
 FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 3}
-"""Format of a fleet's folder and its tables. A column that changes its meaning raises the version;
-for one that is added the fleet's command, run again, makes the tables anew."""
+"""Format of a fleet's folder and its tables. It is raised if a column changes its meaning. If a
+column is added, the next run of the fleet's command makes the tables again."""
 AGAIN: Final = "run the fleet's command again"
 SIGNED: Final = ("exit_code", "truth", "mean", "low", "high")
 """Columns of counts and rates that may be negative: checksums, differences, signals."""
@@ -74,10 +74,10 @@ def read_table(
     compressed with gzip, or its text with the header line. A file that does not exist has no rows,
     like an empty text. ``stated`` are the facts that the summary states of each table, by name: a
     table that it does not state must be empty. It is None if there is no summary. With ``camera``
-    only the rows of that camera are returned, with ``masks`` those of these variants and stages:
-    other rows take no memory. Names are categoricals of text, even if they look like numbers; rates
-    are float64, all other numbers int64. A `ResultsError` if the table is damaged, or not the one
-    that is stated.
+    only the rows of that camera are returned, and with ``masks`` only rows of these variants and
+    stages; other rows take no memory. Names are categoricals of text, even if they look like
+    numbers; rates are float64, all other numbers int64. A `ResultsError` if the table is damaged,
+    or not the one that is stated.
     """
     import pyarrow as pa
 
@@ -100,15 +100,15 @@ def read_table(
             lines = file.readlines() if stated is None else []
             if len({*lines}) < len(lines):
                 raise ValueError("a row is there twice")
-            # It was read to its end: if that is its beginning, there is not even a header.
+            # The file was read to its end. If the end is its beginning, the file has no header.
             content = file if file.tell() else BytesIO(table.header.encode())
             parsed = _parse_csv(content, table, masks)
-            # Each column leaves Arrow's memory as it enters pandas's. Of one chunk it would be a
-            # view, which nobody can write to.
+            # Arrow frees each column as soon as pandas has it. A column of one chunk would become a
+            # view, and nobody can write to a view.
             rows: pd.DataFrame = parsed.to_pandas(
                 split_blocks=parsed[0].num_chunks > 1, self_destruct=True
             )
-    except ValueError as error:  # Arrow's too
+    except ValueError as error:  # errors of Arrow are ValueErrors, too
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
     except OSError as error:
@@ -118,7 +118,7 @@ def read_table(
 
 
 def _open_csv(path: Path) -> BinaryIO:
-    """Open a file, or what a compressed one unpacks to, if that is not far too much."""
+    """Open a file; a compressed one is unpacked, unless it would fill the memory."""
     if path.suffix != ".gz":
         return path.open("rb")
     most = UNPACKED + 100 * path.stat().st_size
@@ -186,7 +186,7 @@ def _parse_csv(
 
 
 def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Container[str]) -> pa.Table:
-    """Return rows with the columns of `LATER`; a ValueError if others lack, or a value is wrong."""
+    """Return rows with the columns of `LATER`; a ValueError for any other defect."""
     import pyarrow as pa
     from pyarrow import compute
 
@@ -211,16 +211,16 @@ def _check_columns(rows: pa.Table, columns: Sequence[Column], complete: Containe
 
 
 def _words_of(cells: pa.ChunkedArray) -> list[str]:
-    """Return the words of a column whose chunks share a dictionary."""
+    """Return the words of a column; its chunks share a dictionary."""
     words: list[str] = cells.chunk(0).dictionary.to_pylist() if cells.num_chunks else []
     return words
 
 
 def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str = "") -> None:
-    """Write tables of a fleet, all of them before the first one takes its name.
+    """Write tables of a fleet; the files get their names when all of them are written.
 
     ``tables`` has the name and the rows of each file; NaN is no value. ``made_of`` is the SHA-256
-    of the summary that they were made of. An OSError if one cannot be written.
+    of the summary from which they were made. An OSError if one cannot be written.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -237,9 +237,10 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str 
             files.append(NewFile(path))
             stack.callback(files[-1].discard)
             files[-1].begin()
-            # Pages have checksums, for Arrow's ZSTD has none. Of short tables the statistics,
-            # dictionaries of numbers, and Arrow's own copy of the schema would be two fifths.
-            # Without that copy the schema's metadata is not written: it is added to the file's.
+            # Pages have checksums, because Arrow's ZSTD has none. In short tables the statistics,
+            # the dictionaries of numbers and Arrow's copy of the schema would take two fifths, so
+            # they are left out. Without that copy Arrow does not write the schema's metadata, so it
+            # is added to the file's metadata.
             with parquet.ParquetWriter(
                 files[-1].partial,
                 schema,
@@ -256,7 +257,7 @@ def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str 
 
 
 def made_of(path: Path) -> str:
-    """Return the digest of what a table was made of; empty if it cannot be read."""
+    """Return the digest of the summary from which a table was made; empty if it cannot be read."""
     from pyarrow import ArrowException, parquet
 
     try:
@@ -276,7 +277,7 @@ def read_parquet(
     """Read a table of a fleet's folder from its files, one below the other.
 
     With ``columns`` only these, and tags, are read and checked; ``drive`` must be one of them.
-    ``runs`` has a number for each file, which a column ``run`` then says of its rows. With ``flag``
+    ``runs`` has a number for each file, which becomes the column ``run`` of its rows. With ``flag``
     only the rows with this column set are returned. A `ResultsError` if a file is missing or
     damaged, or has not the columns that it must have.
     """
@@ -289,7 +290,7 @@ def read_parquet(
         raise ResultsError(f"{error.filename}: is not there; {AGAIN}") from None
     except (OSError, ValueError, pa.ArrowException) as error:
         for path in paths if len(paths) > 1 else ():
-            read_parquet([path], name, columns)  # the damaged one is named
+            read_parquet([path], name, columns)  # its error names the damaged file
         reason = str(error).partition("\n")[0]
         raise ResultsError(f"{paths[0]}: damaged ({reason}); {AGAIN}") from error
     has_gaps = any(c.null_count for c in table.columns if c.type == pa.int64())
@@ -319,7 +320,8 @@ def _read_files(
         check_input(path)
         metadata = parquet.read_metadata(path)
         _check_size(metadata, path.stat().st_size)
-        # As one file: of a path with "drive=" in it a column would be made.
+        # The path is read as one file, because Arrow would make a column of a path with "drive=" in
+        # it.
         with parquet.ParquetFile(
             path, metadata=metadata, read_dictionary=words, page_checksum_verification=True
         ) as file:
@@ -335,10 +337,10 @@ def _read_files(
     rows = rows.unify_dictionaries()
     for cells in (rows[word] for word in words if pa.types.is_dictionary(rows[word].type)):
         texts = _words_of(cells)
-        if any(len(text) > LONG for text in texts):  # many rows may have one
+        if any(len(text) > LONG for text in texts):  # many rows may share a long text
             codes = cells.combine_chunks().indices.drop_null().to_pylist()
             check_texts(texts[code] for code in codes)
-    for drive in rows["drive"].unique().to_pylist():  # files are called after drives
+    for drive in rows["drive"].unique().to_pylist():  # files have the names of drives
         if not is_plain(drive):
             raise ValueError(f"a drive is called {drive[:NAMED]!r}, which is no name")
     tags = [name for name in rows.column_names if of_drives and name.startswith(TAG)]

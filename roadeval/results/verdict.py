@@ -31,23 +31,23 @@ BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
 """Number of independent frames; with fewer, one drive says little about other frames."""
 WORDS: Final = 60
-"""Words of a verdict; a longer one does not explain the baseline."""
+"""Greatest number of words of a verdict; a longer verdict does not explain the baseline."""
 WEAK: Final = 0.02
-"""An error rate from which the preset ``robust`` is worth a try."""
+"""From this error rate on the preset ``robust`` is worth a try."""
 ROBUST: Final = "robust"
 LOOKED_AT: Final = 10
-"""Frames without truth that are worth a look, at most."""
+"""Greatest number of frames without truth that are worth a look."""
 NAMED: Final = 5
-"""Frames without truth that a verdict names."""
+"""Greatest number of frames without truth that a verdict names."""
 
 
 def verdict_on(facts: Facts | FleetFacts) -> str:
     """Return the verdict on a drive or a fleet, after the sentences on what does not fit."""
-    more: dict[str, Any] = {"focus": facts.focus}
+    arguments: dict[str, Any] = {"focus": facts.focus}
     if isinstance(facts, Facts) and not facts.cameras:
-        more |= {"thresholds": facts.thresholds}
-        more |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
-    sentence = verdict(facts.totals, facts.effects, **more)
+        arguments |= {"thresholds": facts.thresholds}
+        arguments |= {"unlabelled": facts.unlabelled, "estimated": facts.estimate}
+    sentence = verdict(facts.totals, facts.effects, **arguments)
     return Sentence(" ").join([*facts.misfits, sentence])
 
 
@@ -102,12 +102,13 @@ def verdict(
 ) -> str:
     """Return the verdict on a drive or a fleet, a few sentences about its focus.
 
-    The default focus is that of `focus_of`. The verdict says how wrong it is and how; how it
-    compares with the baseline and with the same method without the filter; which variant is best,
-    if it is another; and what to do next. ``totals`` are rates by variant and stage, empty if
-    nothing was scored; ``effects`` include those of final masks; ``thresholds`` are the best ones,
-    as in `roadeval.results.facts.Facts`. If nothing was scored, ``unlabelled`` tells which frames
-    to look at. ``estimated`` are rates of the whole drive, from frames drawn at random.
+    `focus_of` chooses the default focus. The verdict says how wrong the focus is, and in which way;
+    how it compares with the baseline and with the same method without the filter; which other
+    variant is best, if there is one; and what to do next. ``totals`` are rates by variant and
+    stage, empty if nothing was scored; ``effects`` include the differences of final masks;
+    ``thresholds`` are the best ones, as in `roadeval.results.facts.Facts`. If nothing was scored,
+    ``unlabelled`` tells which frames to look at. ``estimated`` are rates of the whole drive, from
+    frames drawn at random.
     """
     if not totals:
         return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
@@ -139,15 +140,15 @@ def _how_wrong(name: str, rates: Rates, differences: Sequence[Difference]) -> st
     """Return how many pixels a final mask has wrong, and which ones."""
     if not defined(rates[TESTED]):
         return f"{name}: {TESTED} is undefined on every frame."
-    of = counted(rates["frames"], "frame")
+    sample = counted(rates["frames"], "frame")
     if rates.get("drives", 1) > 1:
-        of = counted(rates["drives"], "drive")
+        sample = counted(rates["drives"], "drive")
         if groups := {change.groups or rates["drives"] for change in differences} - {
             rates["drives"]
         }:
-            of += f" in {counted(min(groups), 'group')}"
-    how = f" It {kinds}." if (kinds := describe_errors(rates)) else ""
-    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({of}).{how}"
+            sample += f" in {counted(min(groups), 'group')}"
+    errors = f" It {kinds}." if (kinds := describe_errors(rates)) else ""
+    return f"{name}: {percent(rates[TESTED], 1)} % of the pixels are wrong ({sample}).{errors}"
 
 
 def describe_errors(rates: Rates) -> str:
@@ -167,15 +168,15 @@ def describe_errors(rates: Rates) -> str:
 
 
 def _compared(focus: str, differences: Mapping[str, Difference]) -> Iterator[str]:
-    """Yield how the focus compares with the baseline and without the filter, here and elsewhere."""
-    named = {BASELINE: BLIND} | ({UNFILTERED: "without the filter"} if focus == FILTERED else {})
-    there = [
+    """Yield how the focus compares with the baseline and without the filter, here and on others."""
+    names = {BASELINE: BLIND} | ({UNFILTERED: "without the filter"} if focus == FILTERED else {})
+    pairs = [
         (differences[base], name)
-        for base, name in named.items()
+        for base, name in names.items()
         if base in differences and differences[base].units
     ]
-    doubt = next((_no_interval(change) for change, _ in there if not change.is_zero), "")
-    points = [_points(change, name, alone=bool(doubt)) for change, name in there]
+    doubt = next((_no_interval(change) for change, _ in pairs if not change.is_zero), "")
+    points = [_points(change, name, alone=bool(doubt)) for change, name in pairs]
     if points:
         yield f"That is {', and '.join(points)}."
     if BASELINE not in differences:
@@ -214,7 +215,7 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
     """Return how a new mask compares with a base, here and on other frames or drives.
 
     ``ends`` are the rates of the base and of the new mask. The text names them if their difference
-    is ``change``, so that they are of the same frames or drives.
+    is ``change``, because then they are of the same frames or drives.
 
     >>> change = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 9)
     >>> print(describe_change(change, "new", "old", ({"ERR": 0.05}, {"ERR": 0.03})))
@@ -222,13 +223,13 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
     """
     if not change.units:
         return f"Nothing to compare: {TESTED} is undefined on every {change.unit[:-1]}."
-    here = counted(change.units, change.unit[:-1])
+    sample = counted(change.units, change.unit[:-1])
     if change.groups not in (None, change.units):
-        here += f" in {counted(change.groups or 0, 'group')}"
+        sample += f" in {counted(change.groups or 0, 'group')}"
     if change.is_zero:
-        return f"{new} is exactly as good as {base} ({here})."
+        return f"{new} is exactly as good as {base} ({sample})."
     if change.better is not None:
-        here += f", better on {change.better}, worse on {change.worse}"
+        sample += f", better on {change.better}, worse on {change.worse}"
     before, after = (rates.get(TESTED) for rates in ends)
     size = f"by {_size(change.mean, change)} points"
     if defined(before) and defined(after) and abs(after - before - change.mean) < ROUNDING:
@@ -241,11 +242,11 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
         if is_sure(replace(change, p_holm=None)):
             family = f", as {change.comparisons} masks are compared"
         doubt = f"This may be chance{family}."
-    return f"{new} is {direction} than {base}: {size} ({here}). {doubt}"
+    return f"{new} is {direction} than {base}: {size} ({sample}). {doubt}"
 
 
 def _ends(change: Difference) -> list[str]:
-    """Return the ends of a difference's interval in percent, the one nearer to 0 first."""
+    """Return the ends of a difference's interval in percent; the end nearer to 0 comes first."""
     ends = sorted((change.low or 0.0, change.high or 0.0), key=abs)
     return [_size(end, change) for end in ends]
 
@@ -274,10 +275,10 @@ def _next_step(
 
 
 def lowest(rates: Mapping[str, Rates]) -> str | None:
-    """Return the variant with the lowest error rate, of those that have masks of all frames.
+    """Return the variant with the lowest error rate, among the variants with masks of all frames.
 
-    ``rates`` are those of final masks by variant, with their number of ``frames``. None if no error
-    rate is defined.
+    ``rates`` are the rates of final masks by variant, with their number of ``frames``. None if no
+    error rate is defined.
     """
     most = max((mask.get("frames", 0) for mask in rates.values()), default=0)
     full = {
@@ -293,7 +294,7 @@ RANKED_BY: Final = {
     "disagreement": "{variant} and the other variants differ most",
     "flicker": "the mask of {variant} changes most from the frame before",
 }
-"""Why frames without truth come first, by what ranks them."""
+"""The reason why a frame without truth comes first, by the sign of doubt that ranks it."""
 
 
 def without_truth(unlabelled: UnlabelledFacts | None) -> Iterator[str]:

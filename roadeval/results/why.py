@@ -27,7 +27,7 @@ MOST: Final = 4
 
 
 def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[Reason]]:
-    """Return the reasons for the errors of each variant for which some are confirmed.
+    """Return the confirmed reasons for the errors of each variant that has some.
 
     They name the class of its false road and the class beside its missed road, the condition under
     which it errs most, and the disturbance that harms it most. Nothing is explained if truth or
@@ -52,11 +52,11 @@ def with_doubts(facts: Facts, sentences: Sequence[str]) -> Facts:
 
 
 def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> Iterator[Reason]:
-    """Yield what is confirmed about a variant: of its classes, its conditions, its disturbances."""
+    """Yield the confirmed reasons of a variant: its classes, its conditions, its disturbances."""
     rows = only(classes, variant=variant)
     for kind, sentence in describe_classes(rows, variant).items():
         frames: list[int] = []
-        if isinstance(facts, Facts):  # those with most false road of a class, or most missed road
+        if isinstance(facts, Facts):  # frames with the most false or missed road of a class
             is_kind = rows["truth"] == ("other" if kind == "false" else "road")
             wrong = rows["road"] if kind == "false" else rows["pixels"] - rows["road"]
             most = wrong.where(is_kind, -1).to_numpy().argmax()
@@ -82,7 +82,7 @@ LEAST_OTHER: Final = 0.1
 
 
 def describe_classes(classes: pd.DataFrame, variant: str) -> dict[str, str]:
-    """Return which classes the false road of a variant is, and which lie beside its missed road.
+    """Return which classes a variant calls road, and which classes lie beside its missed road.
 
     The sentences have the names ``false`` and ``missed``; rare errors have none. ``classes`` are
     the rows of the table of that name, of any number of drives.
@@ -120,7 +120,7 @@ _QUANTITIES: Final = {
     "seconds": ("{} {} s of the drive", "in the first", "after"),
     "hour": ("{} {} UTC", "before", "after"),
 }
-"""Words behind "frames" for each quantity, and those for below and above its limit."""
+"""Words behind "frames" for each quantity, and words for below and above its limit."""
 
 
 def describe_condition(condition: FrameCondition) -> str:

@@ -39,10 +39,6 @@ PRIOR: Final = "prior"
 """Name of the array that belongs to no variant."""
 
 
-class ModelError(RoadevalError):
-    """A model file that cannot be used."""
-
-
 @dataclass(frozen=True, eq=False)
 class Model:
     """The result of training."""
@@ -71,7 +67,7 @@ class Model:
             check_range("prior", self.prior, 0, 1)
 
     def require(self, variant: str, pipeline: Pipeline, path: Path) -> None:
-        """Raise a `ModelError` for a variant that this model was not made for.
+        """Raise a `RoadevalError` for a variant that this model was not made for.
 
         Settings that the parameters do not depend on may differ, and a variant that learns nothing
         needs no model.
@@ -82,7 +78,7 @@ class Model:
             variants = ", ".join(sorted(self.settings))
             problem = f"the model has no variant {variant} (it has {variants})"
             remedy = "train one with the same preset and variants"
-            raise ModelError(problem, where=path, remedy=remedy)
+            raise RoadevalError(problem, where=path, remedy=remedy)
         # Through JSON, as in the file, where tuples and lists are the same.
         relevant = json.loads(json.dumps(pipeline.relevant_settings()))
         made_for = self.settings[variant]
@@ -91,7 +87,7 @@ class Model:
             if there != here:
                 keys = [k for k in {**there, **here} if there.get(k) != here.get(k)]
                 differ = (f"{k} {there.get(k)} there, {here.get(k)} here" for k in keys)
-                raise ModelError(
+                raise RoadevalError(
                     f"the model was made for other settings of {name} in variant {variant} "
                     f"({', '.join(differ)})",
                     where=path,
@@ -101,7 +97,7 @@ class Model:
             if name not in self.parameters.get(variant, {}):
                 lacking = f"{name} of variant {variant} has learnt nothing"
                 problem = f"the model file is incomplete: {lacking}"
-                raise ModelError(problem, where=path, remedy="train it again")
+                raise RoadevalError(problem, where=path, remedy="train it again")
 
 
 def save_model(model: Model, path: Path) -> None:
@@ -123,15 +119,15 @@ def save_model(model: Model, path: Path) -> None:
     arrays["header"] = np.frombuffer(text.encode(), np.uint8)
     content = BytesIO()
     np.savez_compressed(content, allow_pickle=False, **arrays)
-    with writing(path, ModelError):
+    with writing(path, RoadevalError):
         put(path, content.getvalue())
 
 
 def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     """Read a model file; it holds only data, so that a file from elsewhere runs no code.
 
-    A `ModelError` if the file is missing, no model, damaged, or of another version, or if it holds
-    parameters that no training gives: arrays of a wrong shape, numbers that are not finite.
+    A `RoadevalError` if the file is missing, no model, damaged, or of another version, or if it
+    holds parameters that no training gives: arrays of a wrong shape, numbers that are not finite.
 
     Parameters
     ----------
@@ -143,12 +139,12 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     """
     header, arrays = read_archive(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ModelError("not a model file", where=path, remedy="make one with 'roadeval train'")
+        raise RoadevalError("not a model file", where=path, remedy="make one with 'roadeval train'")
     if (version := header.get("version")) != VERSION:
         number = version if isinstance(version, int) else 0
         writer = header.get("roadeval") or WROTE.get(number)
         problem = another_format(writer, later=number > VERSION, remedy="train it again")
-        raise ModelError(problem, where=path)
+        raise RoadevalError(problem, where=path)
     try:
         return make_model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
@@ -157,7 +153,7 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
             first = error.errors(include_url=False)[0]
             reason = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"
         problem = f"a damaged model file: {reason}"
-        raise ModelError(problem, where=path, remedy="train it again") from error
+        raise RoadevalError(problem, where=path, remedy="train it again") from error
 
 
 def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
@@ -168,7 +164,7 @@ def load_cached_model(path: Path, stages: tuple[Stage, ...]) -> Model:
     with suppress(OSError):
         state = path.stat()
         return _load(path, stages, state.st_ino, state.st_size, state.st_mtime_ns)
-    return load_model(path)  # this raises the error as a `ModelError`
+    return load_model(path)  # this raises the error as a `RoadevalError`
 
 
 @lru_cache(maxsize=2)
@@ -177,7 +173,7 @@ def _load(path: Path, stages: tuple[Stage, ...], *_state: int) -> Model:
 
 
 def read_archive(path: Path) -> tuple[Any, Arrays]:
-    """Return header and arrays of a model file; a `ModelError` if it is none."""
+    """Return header and arrays of a model file; a `RoadevalError` if it is none."""
     try:
         check_input(path)
         with ZipFile(path) as packed:
@@ -191,9 +187,9 @@ def read_archive(path: Path) -> tuple[Any, Arrays]:
         return json.loads(arrays.pop("header").tobytes()), arrays
     except Exception as error:  # four libraries read an archive, each with errors of its own
         if isinstance(error, OSError) and error.strerror:
-            raise ModelError(f"cannot read the model: {error.strerror}", where=path) from error
+            raise RoadevalError(f"cannot read the model: {error.strerror}", where=path) from error
         problem, remedy = "not a model file, or a damaged one", "make one with 'roadeval train'"
-        raise ModelError(problem, where=path, remedy=remedy) from error
+        raise RoadevalError(problem, where=path, remedy=remedy) from error
 
 
 @validated(frozen=True)

@@ -381,7 +381,7 @@ def test_a_moved_threshold_gives_the_rates_of_a_replay_at_it(graded, watched, tm
     rates = json.loads(run.stdout)["totals"]["mine"]["net"]
     stated = [f"{rate} {100 * rates[f'pooled_{rate}']:.2f} %" for rate in ("ERR", "FPR", "FNR")]
     assert told.inner_text() == f"All pixels of the drive: {', '.join(stated)}."
-    tab.click("text=As it is")
+    tab.click(".threshold >> text=Reset")
     assert told.inner_text() == before
 
 

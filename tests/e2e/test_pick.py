@@ -11,7 +11,6 @@ import pytest
 from PIL import Image
 
 import roadeval
-from roadeval.logs.truth.picks import Picks, Why
 from tests.e2e.commands import here
 from tests.e2e.test_rig import a_rig
 from tests.fixtures.logged import coco_of, frames_in
@@ -53,11 +52,16 @@ def truths(begun):
     return {frame.stamp_ns: frame.truth for frame in frames_in(begun / "street.mcap")}
 
 
+def picks_in(folder):
+    """Read the picks of a folder as another program would read them."""
+    return json.loads((folder / "pick.json").read_text())
+
+
 def label(folder, truths, only=None, form="png"):
     """Put true labels of picked frames where an annotator would put them."""
-    picked = [e for e in Picks.read(folder).picked if only is None or e.why is only]
+    stamps = stamps_of(picks_in(folder), only)
     values = np.array([0, 255], np.uint8)
-    roads = {f"{e.stamp_ns:019d}.png": truths[e.stamp_ns] == 1 for e in picked}
+    roads = {f"{stamp:019d}.png": truths[stamp] == 1 for stamp in sorted(stamps)}
     for name, road in roads.items() if form == "png" else ():
         Image.fromarray(values[road.astype(int)]).save(folder / "labels" / name)
     if form != "png":
@@ -65,9 +69,9 @@ def label(folder, truths, only=None, form="png"):
         (folder / "labels" / "instances.json").write_text(coco_of(areas))
 
 
-def stamps_of(picks, why):
-    """Return the stamps of the frames that were picked for a reason."""
-    return {each.stamp_ns for each in picks.picked if each.why is why}
+def stamps_of(picks, why=None):
+    """Return the stamps of the frames that were picked, for one reason or for any."""
+    return {frame["stamp_ns"] for frame in picks["picked"] if why in (None, frame["why"])}
 
 
 def scored(work, *words):
@@ -104,7 +108,7 @@ def test_the_folder_has_images_masks_to_correct_and_why_each(begun):
 
 def test_the_number_is_from_the_random_part_alone_and_the_ranked_part_trains(labelled):
     work, summary, done = labelled
-    drawn = stamps_of(Picks.read(work / "to_label"), Why.RANDOM)
+    drawn = stamps_of(picks_in(work / "to_label"), "random")
     frames = pd.read_csv(work / "new" / "frames.csv").query("variant == 'robust'")
     assert {*frames.stamp_ns} == drawn
     assert summary["frames"]["trained_on"] == 5
@@ -122,7 +126,7 @@ def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
     (work / "patch.toml").write_text(f'{QUICK}training.source = "patch"\n')
     label(work / "to_label", truths)
     before, _ = scored(work, *words)
-    label(work / "to_label", {stamp: 1 - (t == 1) for stamp, t in truths.items()}, Why.RANKED)
+    label(work / "to_label", {stamp: 1 - (t == 1) for stamp, t in truths.items()}, "ranked")
     after, _ = scored(work, *words)
     assert before["estimate"]["rates"] == after["estimate"]["rates"]
     assert before["totals"] == after["totals"]
@@ -172,7 +176,7 @@ def test_a_pick_that_was_killed_can_be_run_again(begun, work):
     (folder / "pick.json").unlink()
     words = ("pick", "out.rrd", "-n", 10, "-o", "to_label")
     assert here(*words, cwd=work).returncode == 0
-    assert Picks.read(folder) == Picks.read(begun / "to_label")
+    assert picks_in(folder) == picks_in(begun / "to_label")
     (folder / "pick.json").unlink()
     (folder / "labels" / "mine.png").touch()
     assert "holds something else" in here(*words, cwd=work).stderr
@@ -181,7 +185,7 @@ def test_a_pick_that_was_killed_can_be_run_again(begun, work):
 def test_proposals_as_they_are_count_as_no_labels(work, truths):
     folder = work / "to_label"
     label(folder, truths)
-    drawn = sorted(stamps_of(Picks.read(folder), Why.RANDOM))
+    drawn = sorted(stamps_of(picks_in(folder), "random"))
     for stamp in drawn[:2]:
         shutil.copy(folder / "proposals" / f"{stamp:019d}.png", folder / "labels")
     summary, done = scored(work, "--record", "none")
@@ -194,9 +198,8 @@ def test_a_label_of_a_frame_that_was_not_picked_is_in_no_number(work, truths, la
     folder = work / "to_label"
     label(folder, truths)
     _, alone, _ = labelled
-    other = next(
-        stamp for stamp in Picks.read(folder).stamps if stamp not in Picks.read(folder).by_stamp
-    )
+    picks = picks_in(folder)
+    other = next(stamp for stamp in picks["stamps"] if stamp not in stamps_of(picks))
     Image.fromarray((truths[other] == 1).astype(np.uint8) * 255).save(
         folder / "labels" / f"{other:019d}.png"
     )
@@ -218,19 +221,19 @@ def test_a_log_that_changed_gives_no_number_for_the_whole_drive(work, truths):
 
 def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled, tmp_path):
     work = shutil.copytree(labelled[0], tmp_path / "work")
-    before = Picks.read(work / "to_label")
+    before = picks_in(work / "to_label")
     done = here("pick", "new.rrd", "-n", 8, "-o", "to_label", cwd=work)
     assert done.returncode == 0, done.stderr
-    after = Picks.read(work / "to_label")
-    assert len(after.picked) == len(after.by_stamp) == 18
-    assert {*before.by_stamp} < {*after.by_stamp}
-    assert after.drawn == 9
-    random = [each for each in after.picked if each.why is Why.RANDOM]
+    after = picks_in(work / "to_label")
+    assert len(after["picked"]) == len(stamps_of(after)) == 18
+    assert stamps_of(before) < stamps_of(after)
+    assert after["drawn"] == 9
+    random = [frame for frame in after["picked"] if frame["why"] == "random"]
     assert len(random) == 9
-    assert {each.probability for each in random} == {9 / len(after.stamps)}
+    assert {frame["probability"] for frame in random} == {9 / len(after["stamps"])}
     at_once = here("pick", "out.rrd", "-n", 18, "-o", "at_once", cwd=work)
     assert at_once.returncode == 0
-    assert stamps_of(Picks.read(work / "at_once"), Why.RANDOM) == stamps_of(after, Why.RANDOM)
+    assert stamps_of(picks_in(work / "at_once"), "random") == stamps_of(after, "random")
 
 
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
@@ -242,15 +245,15 @@ def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
     done = here("pick", "street.mcap", "second.mcap", *words, cwd=work)
     assert done.returncode == 0, done.stderr
     assert {each.name for each in (work / "both").iterdir()} == {"street", "second"}
-    assert len(Picks.read(work / "both" / "second").picked) == 3
+    assert len(picks_in(work / "both" / "second")["picked"]) == 3
     assert "results into both/{drive}/labels." in " ".join(done.stdout.split())
     for name in ("street", "second"):
         label(work / "both" / name, truths)
     command = shlex.split(done.stdout.rpartition("next")[2])
     assert here(*command[1:], cwd=work).returncode == 0
     scored = roadeval.Result(work / "labelled").frames
-    picks = [Picks.read(work / "both" / name) for name in ("street", "second")]
-    assert {*scored.stamp_ns} == stamps_of(picks[0], Why.RANDOM) | stamps_of(picks[1], Why.RANDOM)
+    picks = [picks_in(work / "both" / name) for name in ("street", "second")]
+    assert {*scored.stamp_ns} == stamps_of(picks[0], "random") | stamps_of(picks[1], "random")
 
 
 @pytest.mark.parametrize(

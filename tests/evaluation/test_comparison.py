@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from roadeval import RoadevalError
 from roadeval.evaluation.comparison.compare import (
-    ComparisonError,
     MaskChange,
     compare,
     variants_as_sides,
 )
-from roadeval.evaluation.comparison.conditions import Condition, ConditionError, judge
+from roadeval.evaluation.comparison.conditions import Condition, judge
 from roadeval.evaluation.comparison.pairing import (
     common_masks,
     disagreements,
@@ -67,7 +67,7 @@ EMPTY = a_result("empty", a_drive({POST: []}))
     ],
 )
 def test_results_without_a_frame_in_common_are_not_compared(base, new, why):
-    with pytest.raises(ComparisonError, match=why):
+    with pytest.raises(RoadevalError, match=why):
         compare([base, new], SETTINGS)
 
 
@@ -584,7 +584,7 @@ EXAMPLE = r"as 'post\.filtered\.ERR > \+0\.5pp'"
     ],
 )
 def test_anything_else_is_refused_with_an_example_or_the_reason(text, why):
-    with pytest.raises(ConditionError, match=why):
+    with pytest.raises(RoadevalError, match=why):
         Condition.parse(text)
 
 

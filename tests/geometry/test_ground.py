@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.world.camera import Camera, Pose
-from roadeval import configure
+from roadeval import RoadevalError, configure
 from roadeval.config.tables import ConfigError
 from roadeval.data import Calibration, Mounting
-from roadeval.geometry.ground import Ground, GroundError, ground_of
+from roadeval.geometry.ground import Ground, ground_of
 from roadeval.geometry.plan import OUTSIDE, Plan
 from roadeval.geometry.settings import GroundSettings
 
@@ -158,7 +158,7 @@ def test_a_homography_is_what_four_corners_say():
     homography, _ = cv2.findHomography(seen, places)
     alone, _ = ground_of(None, GroundSettings(homography=tuple(homography.ravel())), SIZE)
     assert alone.pixels(PLACES) == pytest.approx(made().pixels(PLACES), abs=1e-3)
-    with pytest.raises(GroundError, match="homography alone"):
+    with pytest.raises(RoadevalError, match="homography alone"):
         alone.moved(pitch=1)
     settings = GroundSettings(homography=tuple(-7 * homography.ravel()), focal=(560.0,))
     posed, _ = ground_of(None, settings, SIZE)
@@ -249,7 +249,7 @@ def test_settings_that_do_not_go_together_are_refused(fields: dict[str, float], 
 
 
 def test_a_homography_of_zeros_is_refused():
-    with pytest.raises(GroundError, match="cannot be inverted"):
+    with pytest.raises(RoadevalError, match="cannot be inverted"):
         ground_of(None, GroundSettings(homography=(0.0,) * 9), SIZE)
 
 
@@ -271,7 +271,7 @@ def test_a_homography_of_zeros_is_refused():
     ],
 )
 def test_a_camera_that_cannot_be_is_refused_by_the_name_of_its_setting(fields: dict[str, Any]):
-    with pytest.raises(GroundError, match=rf"^`ground\.{next(iter(fields))}`"):
+    with pytest.raises(RoadevalError, match=rf"^`ground\.{next(iter(fields))}`"):
         ground_of(None, GroundSettings(**fields), SIZE)
 
 

@@ -47,7 +47,11 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
     if of_fleet:
         columns["kept"] = ["yes" if frame.recording else "-" for frame in frames]
     elif is_scored:
-        columns["why"] = [_why(frame) for frame in frames]
+        columns["why"] = []
+        for frame in frames:
+            notes = (note.removeprefix(f"{frame.variant} ") for note in frame.notes)
+            clauses = [f"{describe_errors(frame.rates)}.", *notes]
+            columns["why"].append(" ".join(text[:1].upper() + text[1:] for text in clauses))
     titles = [*columns]
     texts = {"drive", "camera", "why"} | ({""} if of_fleet else set())
     places = [place for place, title in enumerate(titles) if title in texts]
@@ -57,10 +61,3 @@ def show(name: str, frames: Sequence[WorstFrame], out: Console, *, of_fleet: boo
     if of_fleet and not all(frame.recording for frame in frames):
         out.print()
         out.print("If a recording was not kept, --worst K says how to make it.")
-
-
-def _why(frame: WorstFrame) -> str:
-    """Return the errors of a frame and the notes on it, without its variant's name."""
-    about = [note.removeprefix(f"{frame.variant} ") for note in frame.notes]
-    clauses = [f"{describe_errors(frame.rates)}.", *about]
-    return " ".join(clause[:1].upper() + clause[1:] for clause in clauses)

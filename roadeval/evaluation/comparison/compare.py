@@ -48,10 +48,6 @@ _OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
 """Settings that change the frames and their truth, and not the method."""
 
 
-class ComparisonError(RoadevalError):
-    """Results that cannot be compared."""
-
-
 @dataclass(frozen=True)
 class ComparedResult:
     """One of the results."""
@@ -188,7 +184,7 @@ def variants_as_sides(
 
     ``variants`` are the names of all its variants, ``chosen`` of those to compare, in order. By
     default all but the baseline are compared, ``unfiltered`` first; a single one is compared with
-    the baseline. A `ComparisonError` if a variant is missing, or there are fewer than two.
+    the baseline. A `RoadevalError` if a variant is missing, or there are fewer than two.
     """
     pipelines = sorted((n for n in variants if n != BASELINE), key=lambda name: name != UNFILTERED)
     if len(pipelines) == 1:
@@ -197,12 +193,12 @@ def variants_as_sides(
     for name in names:
         if name not in variants:
             choice = f"{likely(name, variants)}there are {', '.join(variants)}"
-            raise ComparisonError(f"no variant {name}", where=result.label, remedy=choice)
+            raise RoadevalError(f"no variant {name}", where=result.label, remedy=choice)
     if len(names) < 2:
         problem = f"{names[0]} alone cannot be compared" if names else "no variant can be compared"
         there = ", ".join(variants) or "it has none"
         remedy = f"name two of its variants with --variant ({there}), or a second result"
-        raise ComparisonError(problem, where=result.label, remedy=remedy)
+        raise RoadevalError(problem, where=result.label, remedy=remedy)
     return [replace(result, label=name, variants={name: name}) for name in names]
 
 
@@ -212,14 +208,12 @@ def compare(
     """Compare results with the first of them.
 
     ``across_variants`` says that the sides are variants of one result, to be compared with each
-    other. A `ComparisonError` if a result has nothing to compare, or two have no drive or no
+    other. A `RoadevalError` if a result has nothing to compare, or two have no drive or no
     frame in common.
     """
     for side in sides:
         if not side.scored:
-            raise ComparisonError(
-                "nothing was scored, so nothing can be compared", where=side.label
-            )
+            raise RoadevalError("nothing was scored, so nothing can be compared", where=side.label)
     base, *others = sides
     parts = []
     for new in others:
@@ -231,8 +225,8 @@ def compare(
             for side in (new, old):
                 if any(drive.digest is None for drive in side.scored):
                     problem = f"{side.label} does not say which log it is from"
-                    raise ComparisonError(f"{problem}, so nothing can be compared")
-            raise ComparisonError(
+                    raise RoadevalError(f"{problem}, so nothing can be compared")
+            raise RoadevalError(
                 f"{old.label} and {new.label} are of different drives: a comparison would mix "
                 "the scene with the method; compare results of the same drives"
             )
@@ -305,7 +299,7 @@ def _compare_two(
         parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups, [TESTED]))
     if not masks:
-        raise ComparisonError(
+        raise RoadevalError(
             f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
             "nothing can be compared; replay the same range into both"
         )

@@ -57,10 +57,6 @@ _GRAMMAR: Final = re.compile(
 )
 
 
-class ConditionError(RoadevalError):
-    """A condition that cannot be read."""
-
-
 @dataclass(frozen=True)
 class Condition:
     """A limit on a rate of a stage of a variant."""
@@ -80,12 +76,12 @@ class Condition:
     def parse(cls, text: str) -> Condition:
         """Read a condition.
 
-        A `ConditionError` if it does not follow the grammar, or asks for certainty about a quantity
+        A `RoadevalError` if it does not follow the grammar, or asks for certainty about a quantity
         without an interval.
         """
         match = _GRAMMAR.fullmatch(text)
         if match is None:
-            raise ConditionError(
+            raise RoadevalError(
                 f"{text!r} is no condition; write STAGE.VARIANT.RATE, one of > >= < <=, and a "
                 "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'; a 'surely' "
                 "after pp means the whole interval"
@@ -93,16 +89,16 @@ class Condition:
         stage, variant, rate, comparator, number, unit, surely = match.groups()
         if rate not in QUANTITIES:
             remedy = f"there are {', '.join(QUANTITIES)}"
-            raise ConditionError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
+            raise RoadevalError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
         if surely and unit == "%":
-            raise ConditionError(
+            raise RoadevalError(
                 "'surely' asks for the interval of a change (pp), and a level (%) has none: leave "
                 "out 'surely', or limit the change",
                 where=repr(text),
             )
         if surely and rate not in COMPARED:
             remedy = f"'surely' goes with {', '.join(COMPARED)}"
-            raise ConditionError(f"{rate} has no interval", where=repr(text), remedy=remedy)
+            raise RoadevalError(f"{rate} has no interval", where=repr(text), remedy=remedy)
         limit = float(number), unit == "pp", bool(surely)
         return cls(" ".join(text.split()), stage, variant, rate, comparator, *limit)
 

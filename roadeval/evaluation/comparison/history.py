@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from roadeval.data.arrays import Flags, Floats, Sums
+from roadeval.data.arrays import Floats
 from roadeval.evaluation.comparison.compare import MaskChange
 from roadeval.evaluation.comparison.conditions import Condition, Judgement
 from roadeval.evaluation.metrics import TESTED
@@ -107,7 +107,12 @@ def find_lines(
     lines: list[Line] = []
     for variant, kind, part, numbers, rates in searched:
         part_rows = rows[[*KEY, "run", "pixels", "group", "stage", *rates]].iloc[numbers]
-        drives, weights, values = _matrices(part_rows, rates, count)
+        column, first = part_rows["pixels"].factorize()[0], ~part_rows["pixels"].duplicated()
+        drives = part_rows.loc[first, [*KEY, "group"]].astype("str")
+        sizes = group_rows(drives.drop_duplicates(), ["group"]).size()
+        weights = 1 / drives["group"].map(sizes).to_numpy(float)  # drives of a group share one
+        values = np.full((len(rates), count, len(drives)), np.nan)  # NaN where a run lacks a drive
+        values[:, part_rows["run"], column] = part_rows[[*rates]].to_numpy().T
         name = {ALL: "", "region": regions.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
         for rate, drive_rates in zip(rates, values, strict=True):
             title = ", ".join(filter(None, (rate, name)))
@@ -121,21 +126,6 @@ def find_lines(
     return lines
 
 
-def _matrices(
-    rows: pd.DataFrame, rates: Sequence[str], count: int
-) -> tuple[pd.DataFrame, Floats, Floats]:
-    """Return the ``D`` drives of some rows, their weights ``(D,)``, and their rates.
-
-    The rates are ``(R, T, D)``, NaN where a run lacks the drive. Drives of a group share a weight.
-    """
-    column, first = rows["pixels"].factorize()[0], ~rows["pixels"].duplicated()
-    drives = rows.loc[first, [*KEY, "group"]].astype("str")
-    sizes = group_rows(drives.drop_duplicates(), ["group"]).size()
-    values = np.full((len(rates), count, len(drives)), np.nan)
-    values[:, rows["run"], column] = rows[[*rates]].to_numpy().T
-    return drives, 1 / drives["group"].map(sizes).to_numpy(float), values
-
-
 def _follow(
     values: Floats, weights: Floats, family: int
 ) -> tuple[Floats, Floats, float, tuple[ChangePoint, ...]]:
@@ -144,12 +134,20 @@ def _follow(
     with np.errstate(invalid="ignore"):
         means = np.where(there, values, 0) @ weights / (there @ weights)
     levels, noise, steps = np.full(len(values), np.nan), 0.0, []
-    for runs in _stretches(there):
+    # A run shares a drive with an earlier run of its stretch. A run without any drive is left out.
+    stretches, seen = list[list[int]](), there[0]
+    for run in np.flatnonzero(there.any(axis=1)).tolist():
+        if not stretches or not (seen & there[run]).any():
+            stretches.append([])
+            seen = there[run]
+        stretches[-1].append(run)
+        seen = seen | there[run]
+    for runs in stretches:
         traced = trace(values[runs], weights, family)
         levels[runs] = traced.levels - traced.levels[-1] + means[runs[-1]]
         noise = traced.noise
         for step in traced.steps:
-            places = [int(runs[place]) for place in step[1:5]]
+            places = [runs[place] for place in step[1:5]]
             steps.append(ChangePoint._make([step.kind, *places, step.change]))
     return means, levels, noise, tuple(steps)
 
@@ -179,23 +177,6 @@ def _ends(
                 interval = mean_distribution(defined, independent=True).interval(confidence)
                 ends[:, run] = levels[run] - defined.mean() + interval
     return ends
-
-
-def _stretches(there: Flags) -> Iterator[Sums]:
-    """Yield groups of runs' positions: a run shares a drive with an earlier run of its group.
-
-    ``there`` is ``(T, D)``. Runs without any drive are left out.
-    """
-    runs: list[int] = []
-    seen = np.zeros(there.shape[1], bool)
-    for run in np.flatnonzero(there.any(axis=1)).tolist():
-        if runs and not (seen & there[run]).any():
-            yield np.array(runs)
-            runs, seen = [], np.zeros_like(seen)
-        runs.append(run)
-        seen |= there[run]
-    if runs:
-        yield np.array(runs)
 
 
 Within = Callable[[Line, Sequence[int], Sequence[int]], Difference]

@@ -95,7 +95,11 @@ def mean_distribution(
         return MeanDistribution(mean, float(series.std(ddof=1)) / math.sqrt(n), n - 1, n)
     precisions, log_factor, of_mean = _models(n)
     if factors is not None:
-        of_mean = _variances_of_sum(factors)
+        spectrum = np.fft.rfft(factors, 2 * n)
+        products = np.fft.irfft(np.abs(spectrum) ** 2)[:n]
+        powers = (1 - _distances(n))[:, None] ** np.arange(1, n)
+        slow, white = products[0] + 2 * powers @ products[1:], products[0]
+        of_mean = np.concatenate([share * slow + (1 - share) * white for share in _SHARES])
     count = precisions.shape[1]
     variances = precisions @ dct(series, norm="ortho")[1 : count + 1] ** 2 / count
     fit = log_factor - count / 2 * np.log(variances)
@@ -146,16 +150,6 @@ def _models(n: int) -> tuple[Floats, Floats, Floats]:
 def _distances(n: int) -> Floats:
     """Return the coefficients that are tried, as their distances from 1."""
     return np.asarray((10.0 * n) ** -np.linspace(0, 1, 48))
-
-
-def _variances_of_sum(factors: Floats) -> Floats:
-    """Return the variance of the sum of values times factors in each model, for variance 1."""
-    n = len(factors)
-    spectrum = np.fft.rfft(factors, 2 * n)
-    products = np.fft.irfft(np.abs(spectrum) ** 2)[:n]
-    powers = (1 - _distances(n))[:, None] ** np.arange(1, n)
-    slow, white = products[0] + 2 * powers @ products[1:], products[0]
-    return np.concatenate([share * slow + (1 - share) * white for share in _SHARES])
 
 
 def cosine_variances(coefficients: Floats, count: int, n: int) -> Floats:

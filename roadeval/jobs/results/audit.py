@@ -53,9 +53,9 @@ class Audit:
     sentences: list[str]
     """Sentences on misfits of the whole drive, on wrong labels, and on other annotators."""
     doubts: list[str]
-    """Those of them that name wrong labels, or say how two people differ."""
+    """The sentences that name wrong labels, or say how two people differ."""
     log: str
-    """Where the log lies."""
+    """The place of the log."""
     config: Path | None
     """The file for ``--config`` that repeats its replay; None if there is none."""
 
@@ -176,7 +176,7 @@ def read_doubts(folder: AnyPath, drive: DriveResult) -> list[str]:
 def _write_audit(
     drive: DriveResult, done: Audit, folder: Path, labels: str, run: str | None
 ) -> None:
-    """Write images, labels to correct and pictures, and last what was found."""
+    """Write images, labels to correct and pictures, and at the end the list of suspects."""
     import cv2
 
     recording, facts, rows = drive.recording, drive.facts, records(done.suspects)

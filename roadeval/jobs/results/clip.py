@@ -40,11 +40,12 @@ def clip(
 ) -> tuple[list[Path], list[str]]:
     """Write short films of where a result fails; return them, and the losses of the log, if any.
 
-    Errors are painted over the camera image: those of the ``focus`` on the left, and those of the
-    best other variant beside it. The result is a recording, its results folder, or a fleet; the
-    output is a folder, or the MP4 or GIF of one clip. The ``worst`` scenes are filmed, one clip
-    each, or the given ``frames``, such as ``range(40, 81)``. With ``mcap`` the messages of the log
-    lie beside each clip. A `RoadevalError` if there are no pictures, or a file cannot be written.
+    Errors are painted over the camera image: the errors of the ``focus`` on the left, and the
+    errors of the best other variant beside them. The result is a recording, its results folder, or
+    a fleet; the output is a folder, or the MP4 or GIF of one clip. The ``worst`` scenes are filmed,
+    one clip each, or the given ``frames``, such as ``range(40, 81)``. With ``mcap`` the messages of
+    the log lie beside each clip. A `RoadevalError` if there are no pictures, or a file cannot be
+    written.
     """
     place, films, losses = Path(output), list[Path](), list[str]()
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
@@ -54,18 +55,19 @@ def clip(
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
     if not scenes or (form and len(scenes) > 1):
-        one = "a file holds one clip: name a folder"
+        one_clip = "a file holds one clip: name a folder"
         none = "no pictures of such frames were kept; --record keeps some, and in a fleet --keep"
-        raise RoadevalError(one if scenes else none, where=place if scenes else result)
-    # With its matrix stated, no player guesses it from the size. With x264's tree of macroblocks
-    # (build 165, AVX-512), one encoding in a hundred of equal pictures has other bytes.
+        raise RoadevalError(one_clip if scenes else none, where=place if scenes else result)
+    # The colour matrix is stated, because a player would guess it from the size. x264's tree of
+    # macroblocks is off: with it (build 165, AVX-512) one encoding in a hundred of equal pictures
+    # has other bytes.
     options = {"crf": "20", "preset": "veryfast", "colorspace": "smpte170m"}
     options["x264-params"] = "mbtree=0"
     total = sum(len(numbers) for _, numbers, _ in scenes)
     steps = map(on_progress, (Progress(done, total, "filming") for done in count(1)))
     titles = [drive.title for drive in drives]
     for drive, numbers, name in scenes:
-        part = drive.path.stem if titles.count(drive.title) > 1 else ""  # drives of one name
+        part = drive.path.stem if titles.count(drive.title) > 1 else ""  # names may repeat
         path = place if form else place / part / f"{name}.mp4"
         log = path.with_suffix(".mcap") if mcap else None
         inputs = [result, drive.path, getattr(drive.facts.log, "path", None)]
@@ -99,7 +101,7 @@ def _scenes(
 def _film(
     drive: DriveResult, frames: Sequence[int], steps: Iterator[None]
 ) -> tuple[Fraction, Iterator[Rgb]]:
-    """Return frames a second, 2 to 30, and the pictures: the focus, and the best other variant."""
+    """Return 2 to 30 frames a second, and the pictures: the focus and the best other variant."""
     recording, picker = drive.recording, FramePicker(drive)
     assert recording is not None
     variants = [variant.name for variant in recording.variants]
@@ -111,7 +113,7 @@ def _film(
     span_s = (recording.stamps[frames[-1]] - recording.stamps[frames[0]]) / 1e9
     rate = min(max((len(frames) - 1) / max(span_s, 0.001), 2), 30)
     speed = f"{span_s * rate / (len(frames) - 1):.1f}" if span_s > 0 else "1.0"
-    about = drive.title if speed == "1.0" else f"{drive.title}, {speed} x speed"
+    title = drive.title if speed == "1.0" else f"{drive.title}, {speed} x speed"
 
     def picture(frame: int) -> Rgb:
         next(steps)
@@ -120,17 +122,17 @@ def _film(
             panel, rates = picker.outcome(recording, name, frame), rates_of.get((frame, name), {})
             numbers = ", ".join(f"{rate} {percent(value)} %" for rate, value in rates.items())
             panels.append(replace(panel, title=f"frame {frame}, {name}: {numbers or 'not scored'}"))
-        return clip_picture(panels, drive.truth(frame), about)
+        return clip_picture(panels, drive.truth(frame), title)
 
     return Fraction(round(100 * rate), 100), map(picture, frames)
 
 
 def _write_log(drive: DriveResult, frames: Sequence[int], path: Path) -> tuple[str, ...]:
     """Write the log's own messages of frames; return the losses of the log."""
-    if (about := drive.facts.log) is None:
+    if (log_facts := drive.facts.log) is None:
         raise RoadevalError("a partial recording, which names no log", where=drive.path)
-    with open_log(open_source(about.path), every_topic=True) as log:
-        if log.digest != about.digest:
-            raise RoadevalError("another log than that of this result", where=about.path)
+    with open_log(open_source(log_facts.path), every_topic=True) as log:
+        if log.digest != log_facts.digest:
+            raise RoadevalError("another log than that of this result", where=log_facts.path)
         log.write_excerpt(str(drive.properties["image_topic"]), frames[0], frames[-1], path)
         return log.losses

@@ -49,9 +49,9 @@ class Compared:
     sides: tuple[Side, ...]
     """The results with the only drive that is compared; empty for several drives."""
     recordings: Mapping[str, DriveResult]
-    """By the results' labels; a folder has none."""
+    """The recordings by the results' labels; a folder has none."""
     lost: tuple[str, ...] = ()
-    """Drives of a fleet that failed, and runs that cannot be read; among the warnings, too."""
+    """Drives of a fleet that failed, and runs that cannot be read; the warnings name them, too."""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -113,14 +113,14 @@ def compare(
     ends = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
     lost = dict.fromkeys([*filter(None, map(_failure_sentence, opened)), *unread])
     comparison = replace(comparison, warnings=(*lost, *ends, *comparison.warnings))
-    alone = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
+    one_drive_sides = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: result.drive
         for side, result in labelled
         if result.drive and result.drive.recording
     }
     judgements = tuple(judge(comparison, conditions, settings))
-    return Compared(comparison, judgements, tuple(alone or ()), recordings, tuple(lost))
+    return Compared(comparison, judgements, tuple(one_drive_sides or ()), recordings, tuple(lost))
 
 
 def _read_table(result: Result, name: str, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
@@ -136,17 +136,17 @@ def _choose_paths(listing: Listing, on_progress: OnProgress) -> tuple[list[Path]
         raise listing.errors[0]
     if not listing.places:
         raise RoadevalError("nothing to compare: name one result, or several")
-    (first, there), *others = listing.places
+    (first, paths), *others = listing.places
     if others:
         base, unread = last_good(listing, on_progress)
         return [base, *(path for path, _ in others)], unread
-    if len(there) > 1:
+    if len(paths) > 1:
         raise RoadevalError(
-            f"holds {len(there)} results",
+            f"holds {len(paths)} results",
             where=first,
             remedy="name behind it the result to hold against them, or use 'roadeval history'",
         )
-    return [*there], ()
+    return [*paths], ()
 
 
 def _failure_sentence(result: Result) -> str:
@@ -165,9 +165,9 @@ def _failure_sentence(result: Result) -> str:
 def _choose_sides(
     opened: Sequence[Result], paths: Sequence[Path], variants: Sequence[str] | None
 ) -> list[Side]:
-    """Return several results, each with those of its variants that are compared.
+    """Return several results, each with the variants of it that are compared.
 
-    A result is named by its file, or by its whole path where another has the same name.
+    A result is named by its file, or by its whole path if another has the same name.
     """
     stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
     labels: list[str] = []
@@ -182,11 +182,11 @@ def _choose_sides(
     for label, result in zip(labels, opened, strict=True):
         names = of_others if sides else of_base
         if pairs and not {*names} & {*result.variants}:
-            named_variants, there = ", ".join(names), ", ".join(result.variants)
-            raise RoadevalError(f"{label}: no variant {named_variants}; there are {there}")
-        named = f"{label} ({renamed})" if renamed and not sides else label
+            named_variants, choices = ", ".join(names), ", ".join(result.variants)
+            raise RoadevalError(f"{label}: no variant {named_variants}; there are {choices}")
+        title = f"{label} ({renamed})" if renamed and not sides else label
         read = partial(_read_table, result)
-        sides.append(Side(named, result.compared, read, names if pairs else None))
+        sides.append(Side(title, result.compared, read, names if pairs else None))
     return sides
 
 
@@ -222,9 +222,9 @@ def as_json(compared: Compared) -> str:
 
 
 NAMED: Final = 5
-"""Drives that failed, which are named."""
+"""Greatest number of failed drives that are named."""
 ROWS: Final = 60
-"""Points of the figure over the drive, at most."""
+"""Greatest number of points of the figure over the drive."""
 
 
 def _frames(side: Side) -> pd.DataFrame:
@@ -233,18 +233,18 @@ def _frames(side: Side) -> pd.DataFrame:
 
 
 def over_drive(compared: Compared) -> list[Chart]:
-    """Return ERR over the one drive, and the baseline's, on the frames that all results have."""
+    """Return ERR of results and baseline over the one drive, on the frames of all results."""
     masks_of = {side.label: finals(_frames(side)) for side in compared.sides}
-    alone = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
+    is_one_variant = all(values_of(rows, "variant") == [label] for label, rows in masks_of.items())
     masks, parts = {}, []
     for variant in dict.fromkeys(v for rows in masks_of.values() for v in rows["variant"]):
-        there = {label: only(rows, variant=variant) for label, rows in masks_of.items()}
-        there = {label: rows for label, rows in there.items() if len(rows)}
-        if not alone and (variant == BASELINE or len(there) < len(masks_of)):
+        rows_of = {label: only(rows, variant=variant) for label, rows in masks_of.items()}
+        rows_of = {label: rows for label, rows in rows_of.items() if len(rows)}
+        if not is_one_variant and (variant == BASELINE or len(rows_of) < len(masks_of)):
             continue
-        common = set.intersection(*(set(rows["frame"]) for rows in there.values()))
-        for label, rows in there.items() if common else ():
-            name = label if alone else f"{label}: {variant}"
+        common = set.intersection(*(set(rows["frame"]) for rows in rows_of.values()))
+        for label, rows in rows_of.items() if common else ():
+            name = label if is_one_variant else f"{label}: {variant}"
             masks[name] = label, variant
             in_all = rows[rows["frame"].isin(common)]
             parts.append(in_all.assign(variant=name, stage="final"))
@@ -256,6 +256,6 @@ def over_drive(compared: Compared) -> list[Chart]:
     size = compared.comparison.settings.window
     size *= max(-(-rows["frame"].nunique() // (size * ROWS)), 1)
     rows = rows.assign(drive="", camera="")  # the results may call them differently
-    # A hue a variant, a dash a result.
+    # Each variant has a colour, and each result has a dash.
     by_mask = looks_of_results(masks) | looks([BASELINE])
     return over_windows(windows(rows, size), [TESTED], by_mask)

@@ -33,10 +33,11 @@ if TYPE_CHECKING:
 
 WORST: Final = 4
 MOVED: Final = 2
-"""Frames that a report shows: the worst, and those that the filter helped and harmed most."""
+"""Number of the worst frames that a report shows, and of frames that the filter helped or harmed
+most."""
 ERRORS_SHOWN: Final = 6
 LAYERS: Final = 2
-"""Number of variants of which such a frame shows the errors, and all layers, on paper."""
+"""On paper a frame shows the errors, and all layers, of so many variants."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -66,8 +67,8 @@ def rates_by_frame(
 class FramePicker:
     """Picks frames of a result and collects their pictures and facts.
 
-    ``outcomes`` and ``layered`` are how many variants' errors, and layers, are shown at most; None
-    for all.
+    A frame shows the errors of at most ``outcomes`` variants, and the layers of at most ``layered``
+    variants; None stands for all.
     """
 
     def __init__(
@@ -107,22 +108,22 @@ class FramePicker:
         return LayerImage(f"{variant}: {spec.name}", image, spec, layer)
 
     def worst(self) -> list[NotableFrame]:
-        """Return the worst frames of the focus, one a scene, all worse than the mean.
+        """Return the worst frames of the focus: one of each scene, if it is worse than the mean.
 
-        Without truth they are the most uncertain frames that have pictures.
+        Without truth these are the most uncertain frames that have pictures.
         """
         if self._focus is None:
             unlabelled = self._result.facts.unlabelled
             look_at = unlabelled.look_at if unlabelled else []
-            there = [frame for frame in look_at if frame in self._result.pictured]
-            return [*map(self._pictured, there[:WORST])]
+            pictured = [frame for frame in look_at if frame in self._result.pictured]
+            return [*map(self._pictured, pictured[:WORST])]
         focus_masks = only(self._finals, variant=self._focus)
         rows = tables.worst(focus_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
         rows = rows[rows[TESTED] >= focus_masks[TESTED].mean()]
         return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
-        """Return the frames that the filter harmed most, or helped most, of scenes not shown."""
+        """Return the frames that the filter harmed or helped most, of scenes not yet shown."""
         pairs = tables.changes(self._result.rows, FILTERED, UNFILTERED)
         apart, besides = scene_ns(pairs["stamp_ns"]), [frame.stamp_ns for frame in shown]
         rows = tables.most_changed_frames(
@@ -132,23 +133,23 @@ class FramePicker:
         return [self._notable(*row) for row in columns.itertuples(index=False)]
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
-        """Return a frame with its pictures, those of layers of at most so many pixels across."""
-        made = self._pictured(frame)
-        above = [*self._from_above(made)]
-        made = replace(made, layers=[*made.layers, *([above] if above else [])])
-        return strip(made, self._all, self._result.inspect(frame), layers)
+        """Return a frame with its pictures; pictures of layers are at most so many pixels wide."""
+        notable = self._pictured(frame)
+        above = [*self._from_above(notable)]
+        notable = replace(notable, layers=[*notable.layers, *([above] if above else [])])
+        return strip(notable, self._all, self._result.inspect(frame), layers)
 
-    def _from_above(self, made: NotableFrame) -> Iterator[LayerImage]:
-        """Yield camera, truth and errors of a frame as they look from above, on known ground."""
+    def _from_above(self, notable: NotableFrame) -> Iterator[LayerImage]:
+        """Yield camera, truth and errors of a frame as seen from above, if the ground is known."""
         facts = self._result.facts
         if (ground := facts.drive.ground) is None:
             return
         plan = Plan(ground, *facts.evaluation.plan, facts.evaluation.plan_width, CELL)
-        for layer in made.images:
+        for layer in notable.images:
             if layer.image.shape[:2] == (ground.height, ground.width):
-                seen = None if layer.array is None else plan.picture(layer.array, IGNORE)
+                picture = None if layer.array is None else plan.picture(layer.array, IGNORE)
                 title = f"from above: {layer.title.replace(': ', ', ')}"
-                yield LayerImage(title, plan.picture(layer.image), layer.spec, seen)
+                yield LayerImage(title, plan.picture(layer.image), layer.spec, picture)
 
     def _pictured(self, frame: int) -> NotableFrame:
         assert self._recording is not None
@@ -158,13 +159,13 @@ class FramePicker:
         self, frame: int, stamp_ns: int, change: float | None = None, variant: str | None = None
     ) -> NotableFrame:
         """Return a frame of a variant, by default the focus, with its pictures if there are any."""
-        result, seen = self._result, self._recording
+        result, recording = self._result, self._recording
         if frame not in result.pictured:
-            seen = None
-        layers = [*self._layers(seen, frame)] if seen and change is None else []
+            recording = None
+        layers = [*self._layers(recording, frame)] if recording and change is None else []
         if (variant := variant or self._focus) is None or frame not in self._scored:
-            assert seen is not None
-            images = [LayerImage("camera", seen.image(frame))]
+            assert recording is not None
+            images = [LayerImage("camera", recording.image(frame))]
             return NotableFrame(frame, stamp_ns, "", {}, images=images, layers=layers)
         masks = only(self._finals, frame=frame).set_index("variant")
         rates: dict[Any, Any] = masks[[*SHORT]].to_dict("index")
@@ -172,7 +173,7 @@ class FramePicker:
             *(frame, stamp_ns, variant, rates),
             change=change,
             notes=[*notes(rates, variant)],
-            images=[*self._outcomes_of(seen, frame)] if seen else [],
+            images=[*self._outcomes_of(recording, frame)] if recording else [],
             layers=layers,
         )
 
@@ -187,7 +188,7 @@ class FramePicker:
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
 
-        The first of a row bears the variant's name, too.
+        The first picture of a row has the variant's name, too.
         """
         image = recording.image(frame)
         focus_first = sorted(recording.variants, key=lambda variant: variant.name != self._focus)
@@ -206,7 +207,7 @@ class FramePicker:
 
 
 def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
-    """Yield every frame of the table: those evaluated, or without truth those with pictures."""
+    """Yield the frames of the table: evaluated frames, or without truth frames with pictures."""
     frames, focus = result.rows, result.focus or ""
     if not len(frames):
         doubts = [*rates_by_frame(result.table("unlabelled"), [*SIGNS])]
@@ -223,7 +224,7 @@ def facts_of(result: DriveResult) -> Iterator[NotableFrame]:
         if focus in rates and focus != BASELINE:
             errors = defaultdict(lambda: math.nan, {name: rates[name][TESTED] for name in rates})
             health = judge(rates[focus], rates.get(BASELINE))
-            change = errors[FILTERED] - errors[UNFILTERED]  # NaN without one of the two
+            change = errors[FILTERED] - errors[UNFILTERED]  # it is NaN if one of the two is missing
             holds = {
                 f"{focus} {health}": health is not Health.OK,
                 f"the filter {'harms' if change > 0 else 'helps'}": abs(change) >= NOTEWORTHY,

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 EARLIER: Final = 7
-"""Number of runs before the last one; conditions compare it with their mean."""
+"""Number of runs before the last one; conditions compare the last one with their mean."""
 DETAILED: Final = 5
 """Number of newest events with named frames."""
 FRAMES: Final = 5
@@ -58,7 +58,7 @@ DRIVES: Final = 3
 NEAR: Final = 10
 """Number of runs on each side of a step; their frames are compared if there is one drive."""
 BATCH: Final = 30
-"""Results whose tables are in memory together."""
+"""Number of results that have their tables in memory together."""
 COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "scores": (*KEY, *MASK, "final", "region", "frames", "TP", "FN", "N", "truth", *search.RATES),
     "drives": (*KEY, "name", "log_digest", "group", "status"),
@@ -74,9 +74,9 @@ class Listing:
     """The results below some places, listed once."""
 
     places: Sequence[tuple[Path, Sequence[Path]]]
-    """Each place with its results: itself, or those below the folder."""
+    """Each place with its results: the place itself, or the results below the folder."""
     errors: Sequence[RoadevalError] = ()
-    """Why other places have none."""
+    """The reasons why other places have none."""
 
     @property
     def paths(self) -> list[Path]:
@@ -85,7 +85,7 @@ class Listing:
 
 
 class TooFewRunsError(RoadevalError):
-    """Fewer than two runs, with those that can be read, and why others cannot."""
+    """There are fewer than two runs; the error has the readable runs, and why others are lost."""
 
     def __init__(self, runs: Sequence[RunFacts], lost: Sequence[str]) -> None:
         problem = f"a history needs two runs, and there is {len(runs) or 'none'}"
@@ -107,7 +107,7 @@ def history(
 ) -> History:
     """Read many results as one history, and find which rate changed in which run.
 
-    A `RoadevalError` if fewer than two of them can be read; the history lists those that cannot.
+    A `RoadevalError` if fewer than two of them can be read; the history lists the others.
 
     Parameters
     ----------
@@ -134,7 +134,13 @@ def history(
         except RoadevalError as error:
             lost.append(error.sentence)
             continue
-        origins[path] = _origin(result, path)
+        origin = result.facts.origin or Origin()
+        file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
+        made_ns = min(max(origin.made_ns or file.stat().st_mtime_ns, 0), 2**63 - 1)
+        labels = {visible(name): visible(text) for name, text in origin.labels.items()}
+        origins[path] = replace(
+            origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels
+        )
         if result.fleet is None:
             drives[path] = result
     runs = _runs_in_order(origins, by, lost)
@@ -161,7 +167,7 @@ def history(
 
 
 def list_results(results: Paths | Listing) -> Listing:
-    """Return the results at some places, or below them; a listing as it is."""
+    """Return the results at some places, or below them; a listing is returned unchanged."""
     if isinstance(results, Listing):
         return results
     places, errors = list[tuple[Path, Sequence[Path]]](), list[RoadevalError]()
@@ -175,7 +181,7 @@ def list_results(results: Paths | Listing) -> Listing:
 
 
 def find_results(path: Path) -> list[Path]:
-    """Return a result's path, or those of the results below a folder, without linked folders.
+    """Return the path of a result, or the paths of the results below a folder, but not in links.
 
     Recordings count only if there is no folder of results. A `RoadevalError` if there is none.
     """
@@ -195,10 +201,10 @@ def find_results(path: Path) -> list[Path]:
 
 
 def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path, Sequence[str]]:
-    """Return the first place's result, or the newest of its runs before a lasting step to worse.
+    """Return the result of the first place, or its newest run before a lasting step to worse.
 
-    Results of the other places are no runs of the folder. Returned with it are the runs that could
-    not be read, and why. A `RoadevalError` if none can be read.
+    Results of the other places are no runs of the folder. The runs that could not be read are
+    returned, too, and why. A `RoadevalError` if none can be read.
     """
     (place, runs), *others = listing.places
     taken = {path.resolve() for path in Listing(others).paths}
@@ -206,14 +212,14 @@ def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path,
     if len(paths) < 2:
         return (paths or [place])[0], ()
     try:
-        made = history(paths, on_progress=on_progress)
+        past = history(paths, on_progress=on_progress)
     except TooFewRunsError as error:
         if not error.runs:
             raise RoadevalError(
                 "no run of it can be read", where=place, remedy=error.remedy
             ) from error
         return Path(error.runs[0].paths[0]), error.lost
-    return Path(made.last_good.paths[0]), made.lost
+    return Path(past.last_good.paths[0]), past.lost
 
 
 def _runs_in_order(
@@ -239,24 +245,15 @@ def _runs_in_order(
     return [RunFacts(*run) for run in zip(paths, firsts, titles, strict=True)]
 
 
-def _origin(result: Result, path: Path) -> Origin:
-    """Return how a result was made; if it states no time, that of its file."""
-    origin = result.facts.origin or Origin()
-    file = path if path.is_file() else path / (FLEET if result.fleet else SUMMARY)
-    made_ns = min(max(origin.made_ns or file.stat().st_mtime_ns, 0), 2**63 - 1)
-    labels = {visible(name): visible(text) for name, text in origin.labels.items()}
-    return replace(origin, made_ns=made_ns, commit=visible(origin.commit), labels=labels)
-
-
 def _read_rows(
     runs: Sequence[RunFacts],
     drives: Mapping[Path, Result],
     lost: list[str],
     on_progress: OnProgress,
 ) -> pd.DataFrame:
-    """Return the rows for `find_lines` of runs, whose results are ``drives`` and fleets.
+    """Return the rows for `find_lines`; the results of the runs are ``drives`` and fleets.
 
-    Of a drive that a run has twice the later result counts.
+    If a run has a drive twice, the later result counts.
     """
     paths = [Path(path) for run in runs for path in run.paths]
     run_of = np.array([number for number, run in enumerate(runs) for _ in run.paths])
@@ -288,8 +285,8 @@ def _read_rows(
 def _read_batch(
     batch: Sequence[tuple[int, Path]], drives: Mapping[Path, Result], name: str, lost: list[str]
 ) -> Iterator[pd.DataFrame]:
-    """Yield a table of one drive, or of some fleets: together unless one of them is damaged."""
-    if name == "classes":  # not every fleet has some
+    """Yield a table of one drive, or of fleets, which are read together unless one is damaged."""
+    if name == "classes":  # older fleets lack this table
         batch = [run for run in batch if run[1] in drives or (run[1] / "classes.parquet").is_file()]
     numbers, paths = [number for number, _ in batch], [path for _, path in batch]
     is_scores = name == "scores"
@@ -308,7 +305,7 @@ def _read_batch(
 
 
 def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows for `find_lines` from tables of all results, whose number is ``run``."""
+    """Return the rows for `find_lines` from tables of all results; ``run`` numbers the results."""
     import pandas as pd
 
     is_class = classes["truth"].isin(["road", "other"]) & (classes["variant"] != BASELINE)
@@ -323,18 +320,18 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     of_classes["kind"] = kinds[np.full(len(classes), 2)]
     of_masks = scores.assign(part=scores["region"], road=scores["TP"] + scores["FN"])
     of_masks["kind"] = kinds[(scores["region"] != ALL).to_numpy(int)]
-    about = drives[[*RUN_KEY, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
-    about = about.merge(
+    logs = drives[[*RUN_KEY, "log_digest", "group", *drives.filter(regex=f"^{TAG}")]]
+    logs = logs.merge(
         only(scores, region=ALL)[[*RUN_KEY, "truth"]].drop_duplicates(RUN_KEY), on=RUN_KEY
     )
     for other in ("log_digest", "drive"):
-        about["group"] = about["group"].astype(object).fillna(about[other].astype(object))
-    about["group"] = about["group"].astype("category")
+        logs["group"] = logs["group"].astype(object).fillna(logs[other].astype(object))
+    logs["group"] = logs["group"].astype("category")
     columns = [*RUN_KEY, "variant", "stage", "kind", "part", "frames", "road", "N", *search.RATES]
     parts = [part.reindex(columns=columns) for part in (of_masks, of_classes) if len(part)]
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
-    # A merge over other categories would make texts of them.
-    rows = rows.merge(about.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
+    # If the categories differ, a merge turns them into texts.
+    rows = rows.merge(logs.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
     return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
 
 
@@ -384,23 +381,23 @@ def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
     with suppress(RoadevalError):  # one of several results may be damaged
         drives = {drive.key: drive for drive in before.compared}
         parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
-    named = [
+    stated = [
         {f"label {name}": value for name, value in run.origin.labels.items()}
         | (facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version})
         for run, facts in ((old, before.facts), (new, after.facts))
     ]
-    parts |= {name: (named[0].get(name), value) for name, value in named[1].items()}
+    parts |= {name: (stated[0].get(name), value) for name, value in stated[1].items()}
     yield from (f"{k} {setting(a)} to {setting(b)}" for k, (a, b) in parts.items() if a != b)
     had, has = (~np.isnan(line.drive_rates[place]) for place in places)
     names = line.drives["drive"].to_numpy()
-    came, gone, same = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
-    for title, which in (
-        ("new drives", came - gone),
-        ("drives that are gone", gone - came),
-        ("drives with other frames or another truth", (came & gone) - same),
+    added, removed, common = (set(names[there]) for there in (has & ~had, had & ~has, had & has))
+    for title, drive_names in (
+        ("new drives", added - removed),
+        ("drives that are gone", removed - added),
+        ("drives with other frames or another truth", (added & removed) - common),
     ):
-        if which:
-            yield f"{title}: {first_of(sorted(which), DRIVES)}"
+        if drive_names:
+            yield f"{title}: {first_of(sorted(drive_names), DRIVES)}"
 
 
 def write(history: History, path: Path) -> Path:

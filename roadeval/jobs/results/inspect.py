@@ -1,4 +1,4 @@
-"""The frames worth opening, and the viewer opened at one."""
+"""The frames that are worth opening, and the viewer that opens at one of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from roadeval.results.sentences import notes
 from roadeval.runtime.text import visible, without_secrets
 
 LISTED: Final = 10
-"""Frames that are listed by default."""
+"""Number of frames that are listed by default."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class WorstFrame:
     """One of the worst frames of a drive, or of all drives of a fleet."""
 
     rank: int
-    """1 is the worst."""
+    """The rank; the worst frame has 1."""
     drive: str
     frame: int
     stamp_ns: int
@@ -46,19 +46,19 @@ class WorstFrame:
     notes: tuple[str, ...] = ()
     """Sentences on it beside its rates, see `roadeval.results.sentences.notes`."""
     picture: str | None = None
-    """In a fleet: the file of its errors."""
+    """The file with the picture of its errors, in a fleet."""
     recording: Path | None = None
-    """The drive's recording, where there is one."""
+    """The drive's recording, if there is one."""
     camera: str = ""
-    """The camera whose frame it is, in a rig."""
+    """The camera that took the frame, in a rig."""
 
 
 def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
     """Rank the worst frames by ERR of the focus's mask; of each scene only the worst counts.
 
-    If nothing was scored, frames are ranked by how much the mask is in doubt, one a scene. In a
-    fleet the frames of all drives are ranked together, all that are known by default. A
-    `RoadevalError` if there is nothing to rank by, as when ERR is undefined on every frame.
+    If nothing was scored, the frames are ranked by the doubt in the mask. In a fleet the frames of
+    all drives are ranked together, and by default all ranked frames are returned. A `RoadevalError`
+    if nothing ranks the frames, for example if ERR is undefined on every frame.
     """
     if fleet := result.fleet:
         if fleet.worst.empty:
@@ -91,7 +91,7 @@ def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
 def rank_frames(
     drive: DriveResult, count: int, among: Collection[int] | None = None
 ) -> list[WorstFrame]:
-    """Rank a drive's frames, or those ``among`` them; none where ERR is undefined on all."""
+    """Rank a drive's frames, or only frames in ``among``; none if ERR is undefined on all."""
     rows, focus, rates = drive.rows, drive.focus, tuple(SHORT)
     if drive.facts.focus is None:
         rows, rates = drive.table("unlabelled"), tuple(SIGNS)
@@ -101,9 +101,9 @@ def rank_frames(
     by = TESTED if TESTED in rates else sign_of(masks)
     if by is None:
         return []
-    apart = tables.scene_ns(rows["stamp_ns"])
+    scene_length_ns = tables.scene_ns(rows["stamp_ns"])
     looked_at = masks if among is None else masks[masks["frame"].isin([*among])]
-    ranked = tables.worst(looked_at, count, by, apart)
+    ranked = tables.worst(looked_at, count, by, scene_length_ns)
     parts: dict[Any, Any] = {}
     rates_of: dict[Any, Any] = {}
     if by == TESTED:
@@ -125,7 +125,7 @@ def rank_frames(
 
 
 def drive_of(result: Result, frame: WorstFrame) -> tuple[DriveResult, str]:
-    """Return the drive of one of a result's worst frames, and how its frames are called there.
+    """Return the drive of one of a result's worst frames, and words that name it before a frame.
 
     A `RoadevalError` if a fleet has not kept its recording, with the command that makes it.
     """
@@ -152,7 +152,7 @@ def _nothing_scored(path: Path) -> RoadevalError:
 def of_rank(result: Result, rank: int) -> WorstFrame:
     """Return the frame of a rank among the worst.
 
-    A `RoadevalError` if there are fewer, or as of `worst_frames`.
+    A `RoadevalError` if there are fewer frames, or `worst_frames` raises one.
     """
     frames = worst_frames(result, rank)
     if rank > len(frames):

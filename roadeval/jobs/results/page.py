@@ -1,4 +1,4 @@
-"""The content of a drive's page: its video, its frames with pictures, and what can be chosen."""
+"""The content of a drive's page: its video, its frames with pictures, and the reader's choices."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 PICTURED: Final = 8
-"""Frames of a page with pictures of all layers, at most."""
+"""Greatest number of frames of a page with pictures of all layers."""
 BYTES: Final = 9_900_000
-"""Size of a page, at most."""
+"""Greatest size of a page."""
 FILMED: Final = 500
-"""Frames of a page's video, at most: a longer drive is thinned."""
+"""Greatest number of frames of a page's video; a longer drive is thinned."""
 PROBABILITY_LAYER: Final = "probability"
 """The layer of a stage that tells how probable road is."""
 FILM_BYTES: Final = 30_000
-"""Bytes of a page's video, at most, for each frame; a third more as text of the page."""
+"""Greatest number of bytes of a page's video for each frame; the text of the page has a third
+more."""
 
 
 def browsed(result: DriveResult) -> FrameBrowser:
@@ -73,14 +74,14 @@ def browsed(result: DriveResult) -> FrameBrowser:
 
 
 def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
-    """Yield the thresholds that can be moved: of stages that tell how probable road is."""
+    """Yield the threshold of each stage that tells how probable road is; the reader can move it."""
     facts, levels = result.facts, result.table("probabilities")
     for variant, stages in facts.curves.items():
         for stage in stages:
             rows = only(levels, variant=variant, stage=stage)
             best, settings = facts.thresholds.get(variant, {}), facts.settings.get(variant, {})
-            now = settings.get(stage, {}).get("threshold", best.get("own"))
-            if now is None or not len(rows):
+            used = settings.get(stage, {}).get("threshold", best.get("own"))
+            if used is None or not len(rows):
                 continue
             by_level = np.zeros((2, LEVELS), np.int64)
             by_level[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
@@ -91,7 +92,7 @@ def _thresholds_of(result: DriveResult) -> Iterator[ThresholdSlider]:
                 line = f"# for --net {variant}={variant}.toml\nfile = {network}\n{line}"
             elif is_own:
                 line = f"# in the settings of {variant}\n[{stage}]\n{line}"
-            yield ThresholdSlider(variant, stage, now, line, counts, by_level, reached=not is_own)
+            yield ThresholdSlider(variant, stage, used, line, counts, by_level, reached=not is_own)
 
 
 def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> film.Film | None:
@@ -103,8 +104,8 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
     if recording is None or not result.pictured or room < FILM_BYTES:
         return None
     scored = {*result.rows["frame"]}
-    there = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
-    chosen = sorted({*evenly(there, FILMED), *_choose_frames(result, PICTURED)})
+    pictured = [frame for frame in result.pictured if frame in scored] or [*result.pictured]
+    frames = sorted({*evenly(pictured, FILMED), *_choose_frames(result, PICTURED)})
     finals_of = {variant.name: variant.stages[-1] for variant in recording.variants}
     layers = {
         variant.name: {spec.name for spec in variant.layers} for variant in recording.variants
@@ -117,7 +118,7 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
     ]
 
     def read(frame: int) -> Iterator[tuple[str, npt.NDArray[np.uint8]]]:
-        on_progress(Progress(bisect_right(chosen, frame), len(chosen), "filming"))
+        on_progress(Progress(bisect_right(frames, frame), len(frames), "filming"))
         yield film.CAMERA, recording.image(frame)
         if frame in scored:
             yield film.TRUTH_PANEL, film.shade_truth(recording.truth(frame))
@@ -129,38 +130,38 @@ def film_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) ->
                 yield film.PROBABILITY.format(name), (probability * 255).astype(np.uint8)
 
     while True:
-        made = film.make_film(chosen, panels, lambda frame: dict(read(frame)), room)
-        if len(made.content) <= room or len(chosen) < 2:
-            return made
-        chosen = chosen[::2]
+        film_file = film.make_film(frames, panels, lambda frame: dict(read(frame)), room)
+        if len(film_file.content) <= room or len(frames) < 2:
+            return film_file
+        frames = frames[::2]
 
 
 def strips_of(result: DriveResult, room: int, on_progress: OnProgress = ignore) -> list[Strip]:
-    """Return frames with their pictures, in the drive's order: the worst, and others.
+    """Return the worst frames, and others, with their pictures in the drive's order.
 
-    At most `PICTURED`, and as many as have room in so many bytes of a page.
+    There are at most `PICTURED`, and no more than fit into so many bytes of a page.
     """
     if result.recording is None:
         return []
-    chosen = _choose_frames(result, PICTURED)
+    frames = _choose_frames(result, PICTURED)
     picker, strips = FramePicker(result, None, None), []
-    for done, frame in enumerate(chosen, 1):
-        made = picker.strip(frame)
-        # On a page pictures are text, with words around each.
-        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+    for done, frame in enumerate(frames, 1):
+        pictures = picker.strip(frame)
+        # A page holds a picture as a text, and has words around it.
+        room -= sum(len(image.content) * 4 // 3 + 400 for image in pictures.images())
         if room < 0:
             break
-        strips.append(made)
-        on_progress(Progress(done, len(chosen), "reading"))
+        strips.append(pictures)
+        on_progress(Progress(done, len(frames), "reading"))
     return sorted(strips, key=lambda strip: strip.frame)
 
 
 def _choose_frames(result: DriveResult, count: int) -> list[int]:
-    """Return frames to picture: the worst of the focus first, then others evenly spread."""
+    """Return the frames to show: first the worst of the focus, then others, evenly spread."""
     rows = result.rows
     scored_frames = {*rows["frame"]}
-    there = [number for number in result.pictured if number in scored_frames]
-    pictured = there or [*result.pictured]
+    pictured_frames = [number for number in result.pictured if number in scored_frames]
+    pictured = pictured_frames or [*result.pictured]
     focus = result.facts.focus
     spread = evenly(pictured, count)
     if focus is None:

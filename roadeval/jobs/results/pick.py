@@ -43,11 +43,11 @@ class PickedFrames:
 
     folder: Path
     picks: Picks
-    """All so far."""
+    """All frames that were picked so far."""
     new: int
     """Frames to label that this command has added."""
     log: str
-    """Where the log lies."""
+    """The place of the log."""
     config: Path
     """The file for ``--config`` that repeats its replay: the recording, or ``run.toml`` beside the
     picks of a log that was replayed here."""
@@ -122,21 +122,21 @@ def open_drives(
 ) -> list[tuple[Path, DriveResult, str | None]]:
     """Open the recordings of some results; a log is replayed into a folder.
 
-    Returned are each one's path, its result, and the configuration of a log that was replayed.
+    Return the path and the result of each, and the configuration of a log that was replayed.
     """
     from roadeval.jobs.run.replay import replay
 
     drives = []
     masks = config.override({"output": {"record": "masks", "figures": False}})
-    for number, path in enumerate(part for one in sources for part in find_recordings(Path(one))):
-        made, run = path, None
+    for number, path in enumerate(part for name in sources for part in find_recordings(Path(name))):
+        file, run = path, None
         if path.suffix != ".rrd":
-            made, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
-            replay(path, masks, save=made, reports=Path(place, "reports"), on_progress=on_progress)
-        drive = Result(made).drive
+            file, run = Path(place, f"{number}.rrd"), run_toml(config, path.name, VERSION)
+            replay(path, masks, save=file, reports=Path(place, "reports"), on_progress=on_progress)
+        drive = Result(file).drive
         if drive is None or drive.recording is None:
             raise RoadevalError(
-                f"{made}: this command takes a recording of one camera; give the log, and "
+                f"{file}: this command takes a recording of one camera; give the log, and "
                 "of several cameras one with --image-topic"
             )
         drives.append((path, drive, run))
@@ -146,7 +146,7 @@ def open_drives(
 
 
 def find_recordings(source: Path) -> list[Path]:
-    """Return the recordings that a fleet has kept, or that of a results folder; else itself."""
+    """Return the recordings of a fleet or of a results folder; another path is returned itself."""
     if not is_fleet(source):
         if not (source / SUMMARY).is_file():
             return [source]
@@ -191,9 +191,9 @@ def _pick_frames(
     doubts = only(rows, variant=name)
     picks_before = _begin_picks(drive, folder, doubts, source, seed)
     scores = picks_before.every_score()
-    if (sign := sign_of(doubts)) is not None:  # how much they are in doubt by now
-        now = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
-        scores = np.array([now.get(float(stamp), np.nan) for stamp in picks_before.stamps])
+    if (sign := sign_of(doubts)) is not None:  # the present doubt replaces the earlier one
+        doubt_of = dict(zip(map(float, doubts["stamp_ns"]), doubts[sign], strict=True))
+        scores = np.array([doubt_of.get(float(stamp), np.nan) for stamp in picks_before.stamps])
     taken = [picks_before.places[stamp] for stamp in picks_before.by_stamp]
     stamps = np.array(picks_before.stamps, np.int64)
     places = choose_frames(
@@ -229,12 +229,12 @@ def _begin_picks(
             raise RoadevalError(f"{folder}: {problem}")
         return picks
     # Files that a killed run has left are written again.
-    left = {*folder.rglob("*")} if folder.exists() else set()
+    leftovers = {*folder.rglob("*")} if folder.exists() else set()
     begun = {folder / IMAGES, folder / PROPOSALS, folder / LABELS, folder / RUN}
-    begun |= {file for file in left if re.fullmatch(r"\d{19}\.png", file.name)}
-    proposed = {file for file in left if folder / PROPOSALS in file.parents}
-    labels = {file for file in left if folder / LABELS in file.parents}
-    if labels or left - begun - proposed:
+    begun |= {file for file in leftovers if re.fullmatch(r"\d{19}\.png", file.name)}
+    proposed = {file for file in leftovers if folder / PROPOSALS in file.parents}
+    labels = {file for file in leftovers if folder / LABELS in file.parents}
+    if labels or leftovers - begun - proposed:
         raise RoadevalError(f"{folder}: holds something else; name a folder of its own")
     stamps, sign = rows["stamp_ns"].tolist(), sign_of(rows)
     if len({*stamps}) < len(stamps):
@@ -260,9 +260,9 @@ def _begin_picks(
 def _write_picks(
     drive: DriveResult, picks: Picks, new: NewPicks, folder: Path, *, labels: str, run: str | None
 ) -> None:
-    """Write images, masks to correct, and last what was picked.
+    """Write images and masks to correct, and at the end the picks.
 
-    ``run`` is the configuration as TOML, of a log that was replayed here; None of a recording.
+    ``run`` is the configuration, as TOML, of a log that was replayed here; a recording has None.
     """
     recording = drive.recording
     assert recording is not None
@@ -293,7 +293,7 @@ def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, byte
 def _add_picks(
     picks: Picks, random: Sequence[int], ranked: Sequence[int], proposals: Mapping[int, str]
 ) -> tuple[Picks, list[Picked]]:
-    """Return the picks with some more, and those that are new, by the drive's order.
+    """Add frames to the picks; return all picks, and the new ones in the drive's order.
 
     A frame that was ranked before, and is drawn now, becomes a random one.
     """
@@ -311,6 +311,6 @@ def _add_picks(
         if float(stamp := picks.stamps[place]) not in picks.by_stamp:
             why, chance = (Why.RANDOM, probability) if place in random else (Why.RANKED, None)
             frame = picks.frames[place]
-            about = why, chance, picks.scores[place], proposals[frame], wave
-            new.append(Picked(frame, stamp, *about))
+            details = why, chance, picks.scores[place], proposals[frame], wave
+            new.append(Picked(frame, stamp, *details))
     return replace(picks, drawn=drawn, picked=[*old, *new]), new

@@ -30,7 +30,7 @@ from roadeval.runtime.files import AnyPath, leads_outside, writing
 PAGES: Final = (".html", ".htm")
 """Endings of files that are written as a page."""
 PICTURED_OF_FLEET: Final = 60
-"""Worst frames of a fleet that a page shows."""
+"""Number of worst frames of a fleet that a page shows."""
 
 
 def write_report(
@@ -90,7 +90,7 @@ _INCHES: Final = {"cm": 1 / 2.54, "mm": 1 / 25.4, "in": 1.0}
 
 
 def inches_of(width: str) -> float:
-    """Return a width in inches; a `RoadevalError` if it is none for a figure.
+    """Return a width in inches; a `RoadevalError` if no figure can have it.
 
     >>> inches_of("85mm") == inches_of("8.5 cm")
     True
@@ -204,11 +204,11 @@ def _page_of(
 
 EXAMPLES: Final = 4
 THUMBNAILS: Final = 4
-"""Frames in figure 2 and on the first page."""
+"""Number of frames in figure 2 and on the first page."""
 
 
 def _pictured(result: DriveResult) -> list[int]:
-    """Return the evaluated frames that have pictures, or of a drive without any all that have."""
+    """Return the evaluated frames with pictures; if there are none, all frames with pictures."""
     evaluated = {*result.rows["frame"]} or {*result.pictured}
     return [number for number in result.pictured if number in evaluated]
 
@@ -221,7 +221,7 @@ def _frames_of_figure_2(result: DriveResult) -> Sequence[int]:
 
 def collect(result: DriveResult) -> Findings:
     """Collect everything that the report of a drive shows."""
-    regions = result.table("regions", final=True)  # read first: it takes more memory than all else
+    regions = result.table("regions", final=True)  # it takes the most memory, so it is first
     pictured, picker = _pictured(result), FramePicker(result)
     worst = picker.worst()
     return Findings(

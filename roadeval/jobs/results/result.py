@@ -1,4 +1,4 @@
-"""Results that are opened: of one drive, whole or partial, and of any number of drives."""
+"""Opened results: of one drive, complete or partial, and of any number of drives."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 OF_ALL: Final = ("code of ", "network ")
 """Beginnings of the names that `input_digests` gives to files of all drives of a fleet."""
 KEPT_ROWS: Final = 500_000
-"""Rows of a table that stays in memory; a larger one is read again, as of most little is used."""
+"""Greatest number of rows of a table that stays in memory; a larger one is read again if needed."""
 NO_NUMBER: Final = ("output", "run", "fleet", "labels.names", "frames.disturb")
 """Tables of a run's settings that change no number."""
 
@@ -80,7 +80,7 @@ def local_path(result: str | Path) -> Path:
 
 
 class DriveResult:
-    """The result of a replay, from an ``.rrd`` or a results folder; for a rig that of a ``camera``.
+    """The result of a replay, from an ``.rrd`` or a results folder, of one ``camera`` of a rig.
 
     Its focus is ``focus`` if it has that variant, else the focus with which it was made. A
     `RoadevalError` if the path is neither, or was written by another program or format.
@@ -92,7 +92,7 @@ class DriveResult:
         self._chosen: Final = focus
         self.recording: Recording | None = None
         if not self.path.is_dir():
-            # Only here: a folder is read without the library that reads recordings.
+            # The import stands here, because a folder is read without the library of recordings.
             from roadeval.recording.recording import Recording
 
             self.recording = Recording(self.path, camera)
@@ -121,7 +121,7 @@ class DriveResult:
 
     @property
     def again(self) -> str:
-        """The command that makes the results again; empty where a run left no configuration."""
+        """The command that makes the results again; empty if a run left no configuration."""
         path = self.path if self.recording else self.path / RUN
         has_configuration = self.recording.result("run") if self.recording else path.exists()
         if not has_configuration or self.facts.log is None:
@@ -137,9 +137,9 @@ class DriveResult:
 
     @cached_property
     def viewable(self) -> Path | None:
-        """The recording that the viewer can open: its own, or of a folder that of the same run.
+        """The recording for the viewer: this one, or the recording of a results folder's run.
 
-        None where that is not where the run wrote it, or is another drive's by now.
+        It is None if no recording lies where the run wrote it, or if it is now of another drive.
         """
         if self.recording is not None:
             return self.path if self.pictured else None
@@ -156,7 +156,7 @@ class DriveResult:
 
     @cached_property
     def facts(self) -> Facts:
-        """The facts; for an incomplete run, those that follow from its tables."""
+        """The facts; an incomplete run has only the facts that follow from its tables."""
         facts = self._written_facts()
         if self._chosen:
             return with_focus(facts, self._chosen, self.table("unlabelled"))
@@ -207,11 +207,11 @@ class DriveResult:
         return Key(visible(self.name), visible(self.facts.drive.camera))
 
     def table(self, name: str, *, final: bool = False) -> pd.DataFrame:
-        """Return the rows of a table, such as ``oracles``; none where the run counted none.
+        """Return the rows of a table, such as ``oracles``; there are none if the run counted none.
 
-        With ``final`` only those of final masks, of ``frames`` or ``regions``. A killed run may
-        have cut one table: frames that are not in both of these are left out, and so are sums over
-        all frames.
+        With ``final`` only rows of final masks are returned, from ``frames`` or ``regions``. A
+        killed run may have cut one table: frames that are not in both of these are left out, and so
+        are sums over all frames.
         """
         rows = self._read.get((name, final))
         if rows is None:
@@ -243,8 +243,8 @@ class DriveResult:
     def pictured(self) -> tuple[int, ...]:
         """The frames that have pictures; empty for a results folder.
 
-        A run may have kept few, and a killed one may have written some layers of its last frames
-        and not others: those are left out.
+        A run may have kept few pictures. A killed run may have written only some layers of its last
+        frames; these frames are left out.
         """
         if self.recording is None:
             return ()
@@ -257,12 +257,12 @@ class DriveResult:
         )
 
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
-        """Return a layer of a variant; None where the run did not keep it."""
+        """Return a layer of a variant; None if the run did not keep it."""
         assert self.recording is not None
         return _if_there(self.recording.layer, variant, name, frame)
 
     def truth(self, frame: int) -> Plane | None:
-        """Return the truth of a frame; None where there is none."""
+        """Return the truth of a frame; None if there is none."""
         assert self.recording is not None
         return _if_there(self.recording.truth, frame)
 
@@ -277,7 +277,7 @@ class DriveResult:
 
     @property
     def properties(self) -> Mapping[str, str | int | float]:
-        """The recording's own properties, about its origin; none of a folder."""
+        """The properties of the recording, which tell its origin; a folder has none."""
         return self.recording.layout.properties if self.recording else {}
 
     @cached_property
@@ -301,8 +301,8 @@ class Result:
     paths
         Recordings, results folders, fleets' folders, or URLs of recordings or of zips of these.
     focus
-        The variant that they are about: verdict, worst frames, pictures. By default what they were
-        made about.
+        The variant that they are about: verdict, worst frames, pictures. By default
+        the focus with which they were made.
 
     Examples
     --------
@@ -339,7 +339,7 @@ class Result:
 
     @cached_property
     def cameras(self) -> dict[str, Result]:
-        """The result of each camera of a rig that was opened alone, by its name; else none."""
+        """The result of each camera by its name, if a single rig was opened; else none."""
         cameras = {}
         for drive in self.rig:
             result = cameras[drive.camera] = Result()
@@ -348,7 +348,7 @@ class Result:
 
     @property
     def rig(self) -> list[DriveResult]:
-        """The cameras of a drive, where the result of several was opened alone; else none."""
+        """The results of the cameras, if a single rig was opened; else there are none."""
         return self._drives if len(self.paths) == 1 < len(self._drives) else []
 
     @property
@@ -357,23 +357,23 @@ class Result:
 
     @property
     def name(self) -> str:
-        """The drive's or the fleet's name; of several results all of them."""
+        """The drive's or the fleet's name; several results have all their names."""
         return ", ".join(result.name for result in self.rig[:1] or self._opened)
 
     @property
     def fleet(self) -> FleetFolder | None:
-        """The fleet's folder, where that was opened alone."""
-        (first, *more) = self._opened
-        return first if isinstance(first, FleetFolder) and not more else None
+        """The fleet's folder, if a single fleet was opened."""
+        (first, *others) = self._opened
+        return first if isinstance(first, FleetFolder) and not others else None
 
     @property
     def drive(self) -> DriveResult | None:
-        """The result of the one drive, where a recording or its folder was opened alone."""
+        """The result of the drive, if a single recording or results folder was opened."""
         return self._drives[0] if self._drives and len(self._opened) == 1 else None
 
     @cached_property
     def facts(self) -> Facts | FleetFacts:
-        """The facts of the first result; for several cameras of a drive, those of all together."""
+        """The facts of the first result; a rig has the facts of all its cameras together."""
         (path, *_), first = self.paths, self._opened[0].facts
         if not self.rig:
             return first
@@ -399,7 +399,7 @@ class Result:
 
     @property
     def recording(self) -> Path | None:
-        """The recording, where that was opened alone."""
+        """The recording, if a single one was opened."""
         alone = len(self.paths) == 1 and self._drives and self._drives[0].recording
         return self.paths[0] if alone else None
 
@@ -431,7 +431,7 @@ class Result:
             if scored is not None:
                 with suppress(RoadevalError):  # the folders of its drives may be gone
                     files = input_digests(ResultsFolder(results_path(result.path, scored)).facts)
-                    # Masks and truth of one drive say nothing of the others'.
+                    # Masks and truth of one drive tell nothing about other drives.
                     settings |= {k: value for k, value in files.items() if k.startswith(OF_ALL)}
             drives += (
                 ComparedDrive(
@@ -518,14 +518,14 @@ def input_digests(facts: Facts) -> dict[str, str]:
     """Return the digests of what a run took from files, by names such as ``masks mine``."""
     digests = {}
     for variant, stages in facts.methods.items():
-        for about in filter(lambda stage: isinstance(stage, Mapping), stages.values()):
-            name = f"code of {variant} ({about.get('stage')})"
-            digests[name] = _short_digest(about, "sha256")
+        for description in filter(lambda stage: isinstance(stage, Mapping), stages.values()):
+            name = f"code of {variant} ({description.get('stage')})"
+            digests[name] = _short_digest(description, "sha256")
     for variant in facts.settings:
         digests[f"network {variant}"] = _short_digest(facts.settings, variant, "net", "sha256")
     for name in facts.masks:
-        shown = name if name == "truth" else f"masks {name}"
-        digests[shown] = _short_digest(facts.masks, name, "sha256")
+        label = name if name == "truth" else f"masks {name}"
+        digests[label] = _short_digest(facts.masks, name, "sha256")
     return {name: digest for name, digest in digests.items() if digest}
 
 

@@ -1,4 +1,4 @@
-"""Many drives in one run: each replayed in a worker, then the tables of all of them."""
+"""Many drives in one run: workers replay them, and then the tables of all drives are written."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class FleetOutcome:
     folder: Path
     counts: Mapping[str, int]
     replayed: int
-    """How many of them this command has replayed."""
+    """Number of drives that this command has replayed."""
     problems: Mapping[str, str]
-    """Why drives failed, by the drives' names in the fleet."""
+    """The reasons why drives failed, by the drives' names in the fleet."""
     facts: FleetFacts
 
     @property
@@ -107,11 +107,11 @@ def replay_fleet(
     run.replay_all()
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
-    asked = {drive: done.asked for drive, done in run.done.items()}
+    asked_digests = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    how = config.evaluation, config.as_dict(), text
+    settings = config.evaluation, config.as_dict(), text
     origin = Origin(time.time_ns(), *commit, {**config.output.labels})
-    facts = writer.finish(members, *how, asked=asked, origin=origin)
+    facts = writer.finish(members, *settings, asked=asked_digests, origin=origin)
     counts = Counter(drive.status for drive in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not drive.repeated for drive in run.done.values())
@@ -127,12 +127,12 @@ class FleetRun:
     config: RunConfig
     on_progress: OnProgress
     executor: Executor | None
-    """Runs the tasks; None until the first task, for which Dask's workers are started."""
+    """It runs the tasks. It is None until the first task, for which Dask's workers are started."""
     workers: int = 1
     done: dict[str, Done] = field(default_factory=dict)
     """Reports of the drives that are done, by their IDs."""
     stack: ExitStack = field(default_factory=ExitStack)
-    """Ends the processes that were started for the run."""
+    """It ends the processes that were started for the run."""
 
     def replay_all(self) -> None:
         """Replay every drive that is not done."""
@@ -166,7 +166,8 @@ class FleetRun:
         """Return the tasks of drives that are not done. Workers check drives behind URLs."""
         waiting = []
         for task in tasks:
-            # A worker waits for a run that claims it, or clears away what a killed one left.
+            # If another run claims the drive, a worker waits for it, or removes what a killed run
+            # left.
             claimed = is_claimed(made_path(self.folder, task.entry.id))
             made = None if task.entry.path is None or claimed else fleet_work.find_valid(task)
             if made is None:
@@ -176,7 +177,7 @@ class FleetRun:
         return waiting
 
     def _engine(self) -> Executor:
-        """Return who does the tasks."""
+        """Return the executor that does the tasks."""
         if self.executor is None:
             starting = start_workers(self.config.run.jobs, self.config.fleet.scheduler)
             self.executor, count = self.stack.enter_context(starting)
@@ -197,15 +198,15 @@ class FleetRun:
             training.append(fleet_work.FoldTask(self.folder, *about))
         self.show("training")
         futures = [engine.submit(fleet_work.train_fold, task) for task in training]
-        made, tasks = [], []
+        models, tasks = [], []
         for fold, future in enumerate(futures):
             try:
-                made.append(future.result())
-            except Exception as error:  # it fails the fold's drives alone
+                models.append(future.result())
+            except Exception as error:  # only the fold's drives fail
                 problem = self._reason(error, f"the model of fold {fold} was trained")
-                made.append(fleet_work.FoldModel(fold, "", problem))
+                models.append(fleet_work.FoldModel(fold, "", problem))
         for entry in self.entries:
-            model = made[folds[entry.id]]
+            model = models[folds[entry.id]]
             path = str(training[model.fold].path)
             config = configs[entry.id].override({"training": {"model": path}})
             how = software(config), model.sha256, model.fold

@@ -65,7 +65,7 @@ FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 
 @dataclass(frozen=True)
 class DriveTask:
-    """The task of a worker that replays a drive; travels to another process."""
+    """The task of a worker that replays a drive; it travels to another process."""
 
     folder: Path
     """The fleet's folder, which has the same path for every worker."""
@@ -77,7 +77,7 @@ class DriveTask:
     model: str = ""
     """SHA-256 of the model file; empty if the drive trains its own model."""
     fold: int | None = None
-    """The fold whose model it is; None without folds."""
+    """The fold that the model belongs to; None without folds."""
 
     @property
     def asked(self) -> str:
@@ -98,13 +98,13 @@ class DriveTask:
 
 @dataclass(frozen=True)
 class Done:
-    """The report of a drive that is done, to the command that replays the fleet."""
+    """A worker's report on a drive that is done, for the command that replays the fleet."""
 
     drive: str
     status: str
     reason: str
     asked: str
-    """Digest of settings, software and model, as of its `DriveTask`."""
+    """Digest of settings, software and model, as in its `DriveTask`."""
     repeated: bool = False
     """Whether the drive was done before."""
 
@@ -202,10 +202,10 @@ def _try_replay(task: DriveTask) -> Made:
         packed=True,
         without=task.config.output.without,
     )
-    alone = replace(task.config.run, jobs=1)
+    one_process = replace(task.config.run, jobs=1)
     pictures = WorstPictures(task.focus)
     try:
-        config = replace(task.config, output=output, run=alone, fleet=FleetSettings())
+        config = replace(task.config, output=output, run=one_process, fleet=FleetSettings())
         outcome = replay(task.entry.source, config, on_frame=pictures.offer)
         _remove(task, PICTURES, *CACHED, *([RECORDINGS] if record == "none" else []))
         for _, frame, _, picture in pictures.worst:
@@ -225,7 +225,7 @@ def _try_replay(task: DriveTask) -> Made:
 
 
 def _remove(task: DriveTask, *folders: str) -> None:
-    """Remove a drive's files in some folders, which replays of another log or settings left."""
+    """Remove a drive's files in some folders; replays of other logs or settings left them."""
     folder, drive = task.folder, task.entry.id
     recording = recording_path(folder, drive)
     paths = {
@@ -265,7 +265,7 @@ def ending_the_run(folder: Path) -> Iterator[None]:
 
 
 def _disk_failure(error: BaseException | None) -> OSError | RecordingError | None:
-    """Return the error in a chain of errors after which nothing can be written; None if none is."""
+    """Return the error in a chain that prevents all writing; None if there is none."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in FULL:
             return error
@@ -281,9 +281,10 @@ class FoldTask:
 
     folder: Path
     fold: int
-    """The fold whose drives the model will score."""
+    """The fold; the model will score its drives."""
     candidates: tuple[tuple[DriveEntry, RunConfig], ...]
-    """Drives of the other folds, with their configurations, in the order of trial."""
+    """Drives of the other folds, with their configurations, in the order in which they are
+    tried."""
     config: RunConfig
     software: Mapping[str, str]
     """Software of the program that asks."""
@@ -299,7 +300,7 @@ class FoldModel:
     """The model of a fold."""
 
     fold: int
-    """The fold whose drives it will score."""
+    """The fold; the model will score its drives."""
     sha256: str
     """SHA-256 of its file; empty if there is none."""
     problem: str = ""
@@ -312,21 +313,21 @@ def train_fold(task: FoldTask) -> FoldModel:
     `FleetError` if the fleet's disk fails, or the worker has other software.
     """
     _check_software(task.software, task.config)
-    about = task.path.with_suffix(".json")
-    with ending_the_run(task.folder), claim_files(task.path, about):
+    facts_file = task.path.with_suffix(".json")
+    with ending_the_run(task.folder), claim_files(task.path, facts_file):
         looks = [stamp_files(entry, config.for_training()) for entry, config in task.candidates]
         parts = [settings_digest(task.config, ""), looks]
         parts += [[entry.id, settings_digest(config, "")] for entry, config in task.candidates]
         digest = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
         with suppress(OSError, ValueError):
-            trained = read_json(read_bounded(about))
+            trained = read_json(read_bounded(facts_file))
             as_asked = {"asked": digest, "sha256": sha256_of(task.path)}
             if isinstance(trained, dict) and as_asked.items() <= trained.items():
                 return FoldModel(task.fold, as_asked["sha256"])
-        return _train_model(task, about, digest)
+        return _train_model(task, facts_file, digest)
 
 
-def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
+def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> FoldModel:
     """Train on enough drives; the file beside the model says why others gave no frames."""
     held = HeldFrames()
     drawn: dict[Path, Sequence[Frame]] = {}
@@ -364,12 +365,12 @@ def _train_model(task: FoldTask, about: Path, asked_digest: str) -> FoldModel:
         "passed_by": passed,
         "training_frames": sorted(model.digests),
     }
-    put(about, json_text(about_model).encode())
+    put(facts_file, json_text(about_model).encode())
     return FoldModel(task.fold, digest)
 
 
 WIDTH: Final = 320
-"""Pixels across their pictures."""
+"""Width of the pictures in pixels."""
 
 
 class WorstPictures:
@@ -378,7 +379,7 @@ class WorstPictures:
     def __init__(self, focus: str | None) -> None:
         self._focus = focus
         self.worst: list[tuple[float, int, int, bytes]] = []
-        """ERR, number, stamp and picture of each, the worst first."""
+        """ERR, number, stamp and picture of each kept frame; the worst frame comes first."""
 
     def offer(self, result: FrameResult) -> None:
         """Keep a frame as long as it is one of the worst; one without a rate is ignored."""
@@ -388,13 +389,13 @@ class WorstPictures:
         if variant is None or not errors or math.isnan(error := errors[-1]):
             return
         near = [rival for rival in self.worst if abs(rival[2] - frame.stamp_ns) < APART_NS]
-        rest = [rival for rival in self.worst if rival not in near]
-        rivals = [*near, *(rest[-1:] if len(rest) == OF_A_DRIVE else [])]
+        others = [rival for rival in self.worst if rival not in near]
+        rivals = [*near, *(others[-1:] if len(others) == OF_A_DRIVE else [])]
         if any(rival[0] >= error for rival in rivals):
             return
-        # Pictures are painted when they are small: most are soon replaced by a worse frame's.
+        # Pictures are painted at a small size, because worse frames soon replace most of them.
         image, errors_of = shrink(frame.image, WIDTH), result.errors[variant].array
         small = shrink(errors_of.astype(np.uint8, copy=False), WIDTH, labels=True)
         picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
-        ranked = [*rest, (error, frame.number, frame.stamp_ns, picture)]
+        ranked = [*others, (error, frame.number, frame.stamp_ns, picture)]
         self.worst = sorted(ranked, key=lambda frame: (-frame[0], frame[1]))[:OF_A_DRIVE]

@@ -1,4 +1,4 @@
-"""A run over a log: prepared, its identity, and its frames, computed in worker threads."""
+"""A run over a log: its preparation, its identity, and its frames, which worker threads compute."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from roadeval.runtime.sentence import Sentence
 from roadeval.runtime.threads import map_ordered
 from roadeval.training import learning
 from roadeval.training.learning import Schedule
-from roadeval.training.model import Model, ModelError
+from roadeval.training.model import Model
 from roadeval.training.settings import TrainingSettings
 from roadeval.version import VERSION
 
@@ -55,13 +55,13 @@ if TYPE_CHECKING:
     from roadeval.recording.recorder import Recorder
 
 KEPT: Final = 5
-"""Tracebacks that are kept, those of the first errors that say different things; and the frames
-that are named of those with one error."""
+"""Greatest number of tracebacks that are kept, each of another error; and of frames that are named
+for an error."""
 HOPELESS: Final = 10
 TRIED: Final = (Role.EVALUATED, Role.UNLABELLED)
-"""A run ends where the first so many frames of these roles fail."""
+"""A run ends if all of the first `HOPELESS` frames of these roles fail."""
 _NUMBER: Final = re.compile(r"(?<![:\d])\d+")
-"""A number that is not the line of a file."""
+"""A number in a message, but not the line of a file."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,10 @@ class Failures:
 
     by_error: dict[tuple[str, str], list[Failure]] = field(default_factory=dict)
     first: list[Failure] | None = field(default_factory=list)
-    """The failures of `TRIED` roles; None once a frame of these did not fail."""
+    """The failures on frames of the roles `TRIED`; None as soon as such a frame did not fail."""
 
     def add(self, failure: Failure) -> None:
-        """Note a frame; its traceback is kept where it is among the first that differ."""
+        """Note a frame; its traceback is kept if it is of one of the first different errors."""
         error = failure.variant, _NUMBER.sub("", failure.reason)
         failures = self.by_error.setdefault(error, [])
         with_traceback = not failures and len(self.by_error) <= KEPT
@@ -94,7 +94,7 @@ class Failures:
             self.first.append(failure)
 
     def tracebacks(self) -> tuple[str, ...]:
-        """Return where in their code stages failed, for the first few errors."""
+        """Return the tracebacks of the first few errors of stages."""
         return tuple(
             failures[0].traceback for failures in self.by_error.values() if failures[0].traceback
         )
@@ -108,7 +108,7 @@ class Failures:
 
 
 SPARSE: Final = 5
-"""Where there are more frames than so many for each label, a note says so."""
+"""If there are more than so many frames for each label, a note says so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class Run:
     """The frames that are not evaluated because the model learnt from them or from neighbours."""
     chains: Mapping[str, Chain]
     layouts: tuple[VariantLayout, ...]
-    """Every variant that is scored, including those with masks in the log."""
+    """Every variant that is scored, also variants with masks in the log."""
     methods: Mapping[str, Mapping[str, Any]]
     """Facts of stages beside their settings, by variant and stage. They are read before the first
     frame: a file that they name may be gone after the last."""
@@ -141,7 +141,7 @@ class Run:
 
     @cached_property
     def disturbed_variants(self) -> tuple[str, ...]:
-        """The variants that run on disturbed frames: those without masks from elsewhere."""
+        """The variants that run on disturbed frames: all variants without masks from elsewhere."""
         return tuple(v.name for v in self.variants if "given" not in v.pipeline.settings)
 
     @cached_property
@@ -167,7 +167,7 @@ class Run:
         return calibration.scaled(*size) if calibration and size else None
 
     def add(self, done: ProcessedFrame) -> ProcessedFrame:
-        """Add a frame, in the camera's order; return it with the lines that take that order."""
+        """Add a frame in the camera's order; return it with the lines that depend on the order."""
         doubts = self.board.add(done.result)
         frame, variants = done.result.frame, done.result.variants
         final_masks = [[*v.masks()][-1][1] for v in variants if v.variant not in frame.external]
@@ -233,7 +233,7 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     is what the camera is called in a rig.
     """
     selection = log.select()
-    again = partial(log.frames, selection)
+    read_frames = partial(log.frames, selection)
     variants = config.variants()
     picks = Picks.of_labels(Path(config.truth.path)) if config.truth.path else None
     if picks and selection.truth and isinstance(selection.truth.pictures, NamedLabels):
@@ -241,19 +241,19 @@ def prepare(log: Log, config: RunConfig, on_progress: OnProgress, camera: str = 
     if picks and config.frames.scale != 1:
         raise RoadevalError("does not go with picked frames", setting="frames.scale")
     labelled = selection.truth is not None
-    stream = again()
+    stream = read_frames()
     frames = len(stream)
     truths = frames if selection.truth is None else len(selection.truth.pictures)
     if frames > SPARSE * truths and picks is None:
         note = "at most {} of {} frames have road truth: {frames.labelled} reads these alone"
         on_progress(Progress(0, None, "opening", Sentence(note, truths, frames)))
     model, schedule = _learn(
-        again, variants, config.training, on_progress, labelled=labelled, picks=picks
+        read_frames, variants, config.training, on_progress, labelled=labelled, picks=picks
     )
     try:
         chains = bind(variants, model)
     except MisfitError as error:
-        raise ModelError.of(error, config.training.model) from error
+        raise RoadevalError.of(error, config.training.model) from error
     trim()
     layouts = [variant.layout() for variant in variants]
     for name, source in selection.masks.items():
@@ -348,9 +348,8 @@ def software(config: RunConfig) -> dict[str, str]:
 def identity(log: Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
     """Return a digest of the log, the settings, the model file and the software, in hexadecimal.
 
-    Equal for the same input, in any place of log, model and masks. ``masks`` are the digests of
-    those that lie beside the log, by their variant. A `RoadevalError` if the disk of one of them
-    fails.
+    It is equal for the same input, wherever log, model and masks lie. ``masks`` are the digests of
+    the masks beside the log, by their variant. A `RoadevalError` if the disk of one of them fails.
     """
     model = config.training.model
     return settings_digest(config, sha256_of(Path(model)) if model else "", log.digest, masks or {})
@@ -360,7 +359,7 @@ def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
     """Return a digest of settings, software, the SHA-256 of a model, and more, in hexadecimal."""
     masks = {name: replace(m, path="", images=None) for name, m in config.masks.items()}
     truth = replace(config.truth, path="", images=None)
-    nowhere = "" if config.training.adapt else None  # wherever the file lies
+    nowhere = "" if config.training.adapt else None  # the place of the file does not matter
     training = replace(config.training, model=nowhere)
     settings = deciding(config).without_places()
     output = replace(settings.output, focus=None)
@@ -373,7 +372,7 @@ def settings_digest(config: RunConfig, model: str, *more: Any) -> str:
 class ProcessedFrame:
     """A scored frame without its layers, its lines of the tables, and its encoded form.
 
-    ``position`` counts the frames that were read, from 1, those included that cannot be decoded.
+    ``position`` counts all frames that were read, from 1, even if they cannot be decoded.
     """
 
     position: int
@@ -395,7 +394,7 @@ def process(
     total, read = sum(len(run.frames) for run in runs), Counter[int]()
 
     def numbered() -> Iterator[tuple[Run, int, LoggedFrame]]:
-        """Yield the frames, each with its position among its camera's."""
+        """Yield each frame with its run, and its position among the frames of its camera."""
         for place, logged in merge_streams([run.frames for run in runs]):
             read[place] += 1
             yield runs[place], read[place], logged
@@ -433,10 +432,10 @@ def _process(
     try:
         frame = replace(logged.decode(), camera=run.key.camera)
     except FrameError:
-        return run, None  # the log's accounting has it, with the reason
+        return run, None  # the log's account has this frame, with the reason
     role = run.schedule.role(frame)
     if role is Role.UNLABELLED and frame.truth is not None:
-        frame = replace(frame, truth=None, classes=None)  # it is a proposal as it was made
+        frame = replace(frame, truth=None, classes=None)  # its label is an unchanged proposal
     is_scored = role is Role.EVALUATED
     truths = {"truth": frame.truth, "shadow_truth": frame.shadow_truth} if is_scored else {}
     shared: dict[Any, Any] = {}
@@ -461,7 +460,7 @@ def _process(
     result = replace(result, notes=notes_of(result.tallies), disturbed=disturbed)
     lines = run.csv_lines(frame_rows(result))
     encoded = recorder.encode(result, position - 1) if recorder else None
-    # Results wait for their turn, and would wait with some 15 bytes a pixel.
+    # Results wait for their turn; with their layers they would take some 15 bytes a pixel.
     return run, ProcessedFrame(position, result.without_layers(), lines, encoded, failures)
 
 
@@ -483,7 +482,7 @@ def _disturb(run: Run, frame: Frame) -> tuple[dict[str, FrameResult], list[Failu
             layers = tuple(a for a in last.output.layers if a.spec.name == last.stage)
             last = replace(last, output=replace(last.output, layers=layers))
             variants.append(VariantResult(name, (last,)))
-        # Its file is the undisturbed image's, and its truth is recorded there.
+        # The frame's file is of the undisturbed image, and the truth is recorded with that image.
         bare = replace(frame, image=image, media_type=None, truth=None, shadow_truth=None)
         result = FrameResult(bare, Role.EVALUATED, tuple(variants))
         results[text] = score_finals(result, frame.truth)

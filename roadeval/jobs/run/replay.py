@@ -109,17 +109,17 @@ def replay(
             note = f"{variant.name}: {about['reading']}"
             on_progress(Progress(0, None, "opening", note))
     with open_log(open_source(drive, config.run.patience_s), config) as log:
-        to = Outputs.of(config.output, log.name)
-        with to.holding((drive, config.training.model)):
-            outcome = _replay_log(log, config, to, on_progress, on_frame)
-            if to.recording is None and (save := config.output.save) is not None:
+        paths = Outputs.of(config.output, log.name)
+        with paths.holding((drive, config.training.model)):
+            outcome = _replay_log(log, config, paths, on_progress, on_frame)
+            if paths.recording is None and (save := config.output.save) is not None:
                 unwritten = "{output.save} {} is not written: {output.record} is none"
                 return replace(outcome, warnings=(*outcome.warnings, Sentence(unwritten, save)))
             return outcome
 
 
 def _replay_log(
-    log: Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
+    log: Log, config: RunConfig, paths: Outputs, on_progress: OnProgress, on_frame: OnFrame
 ) -> Outcome:
     """Run over the log. The outputs get their names when all of them are complete."""
     commit, cameras = current_commit(), config.by_camera()
@@ -128,9 +128,9 @@ def _replay_log(
         for name, camera_config in cameras.items()
     ]
     with (
-        SidecarWriter(to.mcap) if to.mcap else nullcontext() as sidecar,
-        recorder_for(runs, to.recording, config) as recorder,
-        ResultsWriter(to.reports, packed=config.output.packed) as results,
+        SidecarWriter(paths.mcap) if paths.mcap else nullcontext() as sidecar,
+        recorder_for(runs, paths.recording, config) as recorder,
+        ResultsWriter(paths.reports, packed=config.output.packed) as results,
     ):
         drawn = _record_frames(
             runs, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
@@ -147,15 +147,15 @@ def _replay_log(
 
             with results.explain_errors():
                 names = short_names([*cameras])
-                for camera, end in zip(cameras, ended, strict=True):
-                    windows, shown = end.sums.windows, drawn[camera]
-                    write_figures(results.folder, log.name, windows, shown, names[camera])
+                for camera, camera_result in zip(cameras, ended, strict=True):
+                    windows, examples = camera_result.sums.windows, drawn[camera]
+                    write_figures(results.folder, log.name, windows, examples, names[camera])
         facts = replace(facts, origin=Origin(time.time_ns(), *commit, {**config.output.labels}))
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     of_focus = finals(only(ended[0].sums.frames, variant=facts.focus or ""))
-    files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
+    files = [paths.reports / name for name in facts.files] + ([paths.mcap] if paths.mcap else [])
     return Outcome(
-        *(to.recording, to.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
+        *(paths.recording, paths.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
         tuple(files),
         tracebacks=tracebacks,
         metres=ended[0].metres if len(ended) == 1 else (),
@@ -183,8 +183,8 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
     rows = sum_rows(run.board, sums.windows, run.selection.classes)
     lines = run.csv_lines(rows)
     results.append(lines)
-    shown = [example.frame for example in examples]
-    facts = summary.make_facts(run, sums, shown, {} if run.camera else results.tables)
+    example_numbers = [example.frame for example in examples]
+    facts = summary.make_facts(run, sums, example_numbers, {} if run.camera else results.tables)
     of_classes = [(*run.key, *row) for row in rows["classes"]]
     classes = pd.DataFrame(of_classes, columns=[*TABLES["classes"].names])
     facts = replace(facts, why=explain(facts, classes))
@@ -215,10 +215,10 @@ def _finish_recording(
         if recorder:
             recorder.finish(ended[0].texts)
         return ended[0].facts
-    by_camera = {run.camera: end for run, end in zip(runs, ended, strict=True)}
-    frames = concatenate([end.sums.frames for end in ended])
-    disturbed = concatenate([end.sums.disturbed for end in ended])
-    camera_facts = {name: end.facts for name, end in by_camera.items()}
+    by_camera = {run.camera: camera_result for run, camera_result in zip(runs, ended, strict=True)}
+    frames = concatenate([camera_result.sums.frames for camera_result in ended])
+    disturbed = concatenate([camera_result.sums.disturbed for camera_result in ended])
+    camera_facts = {name: camera_result.facts for name, camera_result in by_camera.items()}
     facts = summary.join_cameras(frames, disturbed, camera_facts, results.tables)
     if recorder is None:
         return facts
@@ -226,7 +226,7 @@ def _finish_recording(
     steady = {name: replace(facts, seconds={}) for name, facts in camera_facts.items()}
     recorded = replace(facts, run=deciding(config).as_dict(), cameras=steady)
     toml = run_toml(deciding(config), facts.drive.name, VERSION)
-    texts = {name: end.texts for name, end in by_camera.items()}
+    texts = {name: camera_result.texts for name, camera_result in by_camera.items()}
     recorder.finish({"summary": recorded.text(), "run": toml}, by_camera=texts)
     return facts
 
@@ -240,7 +240,7 @@ def _record_frames(
     on_progress: OnProgress,
     on_frame: OnFrame,
 ) -> dict[str, list[ExampleFrame]]:
-    """Run over the frames; return those for the figure of masks, by camera."""
+    """Run over the frames; return the frames for the figure of masks, by camera."""
     examples = {run.camera: ExampleFrames(len(run.frames)) for run in runs}
     total = sum(len(run.frames) for run in runs)
     for position, (run, done) in enumerate(process(runs, recorder, on_progress), 1):

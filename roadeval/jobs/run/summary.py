@@ -48,9 +48,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FEW: Final = 12
-"""Frames of a log that are looked at, with their neighbours, where nothing is replayed."""
+"""Number of frames of a log that are examined, with their neighbours, if nothing is replayed."""
 RANKS_AT_ONCE: Final = ("entropy", "disagreement")
-"""Signs that a frame has by itself, without the one before."""
+"""Signs of doubt that follow from one frame, without the frame before."""
 OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "why", "seconds")
 """Names of facts that only a single camera has, not a rig."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
@@ -134,8 +134,8 @@ def _why_not_random(run: Run, picks: Picks) -> str:
     """Return why the labelled frames are not a random part of the drive, or an empty text."""
     if picks.log != run.log.digest:
         return "the log is not as it was when its frames were picked: pick again, into a new folder"
-    seen, labelled = run.frames.accounting, run.config.frames.labelled
-    if seen.in_range < seen.in_log or (seen.read < seen.in_range and not labelled):
+    account, labelled = run.frames.accounting, run.config.frames.labelled
+    if account.in_range < account.in_log or (account.read < account.in_range and not labelled):
         return "only a part of the drive was read"
     return ""
 
@@ -244,7 +244,7 @@ def join_cameras(
 
 
 def _add_counts(parts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
-    """Add up the counts of cameras, which are trees of two names."""
+    """Add up the counts of cameras, which are nested by two names."""
     sums: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for part in parts:
         for name, counts in part.items():
@@ -394,10 +394,10 @@ def _method_warnings(run: Run) -> Iterator[str]:
 
 def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield which masks of other systems are missing, belong to no frame, or are not disturbed."""
-    seen = run.frames.accounting
+    account = run.frames.accounting
     for name, masks in run.selection.labels.items():
-        if name in run.selection.masks and (missing := seen.read - seen.masks[name]):
-            without = f"{name}: {missing} of the {seen.read} frames read have no mask of it"
+        if name in run.selection.masks and (missing := account.read - account.masks[name]):
+            without = f"{name}: {missing} of the {account.read} frames read have no mask of it"
             rest = "it is scored on the others alone" if name in totals else "it has no score"
             yield f"{without}: {rest}"
         shown, where = name.removeprefix("/"), masks.where
@@ -421,7 +421,7 @@ def _mask_warnings(run: Run, totals: Totals) -> Iterator[str]:
 
 def _mask_facts(run: Run) -> dict[str, Any]:
     """State where labels lie that are not in the log, and how many frames have one."""
-    masks, seen = {}, run.frames.accounting
+    masks, account = {}, run.frames.accounting
     for name, digest in run.selection.digests().items():
         source = run.selection.masks.get(name, run.selection.truth)
         assert source is not None
@@ -430,20 +430,20 @@ def _mask_facts(run: Run) -> dict[str, Any]:
             "digest": digest,
             "pairing": source.why,
             "meaning": source.meaning.words,
-            "frames": seen.masks[name] if name in run.selection.masks else seen.labelled,
+            "frames": account.masks[name] if name in run.selection.masks else account.labelled,
         }
     return masks
 
 
 def _account_for_frames(run: Run) -> FrameAccount:
     """Account for every frame of the image topic: evaluated, or skipped and why."""
-    seen, roles = run.frames.accounting, Counter(run.board.roles())
+    account, roles = run.frames.accounting, Counter(run.board.roles())
     labelled, is_first = run.config.frames.labelled, run.config.training.placement == "first"
     skipped = {
-        "outside the range": seen.in_log - seen.in_range,
-        f"not read ({'no truth, ' * labelled}stride or limit)": seen.in_range - seen.read,
-        "undecodable": len(seen.undecodable),
-        "failed in a stage": seen.read - len(seen.undecodable) - sum(roles.values()),
+        "outside the range": account.in_log - account.in_range,
+        f"not read ({'no truth, ' * labelled}stride or limit)": account.in_range - account.read,
+        "undecodable": len(account.undecodable),
+        "failed in a stage": account.read - len(account.undecodable) - sum(roles.values()),
         "trained on": roles[Role.TRAINING],
         "equal to a training frame": roles[Role.COPY],
         f"gap {'after' if is_first else 'beside'} training": roles[Role.GAP],
@@ -451,10 +451,10 @@ def _account_for_frames(run: Run) -> FrameAccount:
         "picked": roles[Role.PICKED],
     }
     return FrameAccount(
-        in_log=seen.in_log,
-        read=seen.read,
-        decoded=seen.read - len(seen.undecodable),
-        labelled=seen.labelled,
+        in_log=account.in_log,
+        read=account.read,
+        decoded=account.read - len(account.undecodable),
+        labelled=account.labelled,
         trained_on=roles[Role.TRAINING],
         evaluated=roles[Role.EVALUATED],
         skipped={reason: number for reason, number in skipped.items() if number},

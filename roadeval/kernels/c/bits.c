@@ -1,17 +1,19 @@
-/* Loops over masks as bits: a word holds 64 pixels, the leftmost in its lowest bit. */
+/* Loops over masks as bits. A word holds 64 pixels, and its lowest bit is the leftmost pixel. */
 
 #include <string.h>
 
 #include "loops.h"
 
-/* `counts`: mask_count x class_count x region_count; `both`: as many as words. */
+/* Count the pixels of each mask that lie in each class and region.
+ *
+ * `counts` has mask_count x class_count x region_count elements. `both` has `words` elements. */
 LOOP void count_bits(
     const uint64_t *restrict masks, int64_t mask_count, const uint64_t *restrict classes,
     int64_t class_count, const uint64_t *restrict regions, int64_t region_count, int64_t words,
     int64_t *restrict counts, uint64_t *restrict both)
 {
     for (int64_t region = 0; region < region_count; region++) {
-        /* Many regions are a part of the rows: the words before and after it hold no pixel. */
+        /* Many regions cover only some of the rows. The words before and after them are skipped. */
         const uint64_t *inside = regions + region * words;
         int64_t first = 0, last = words;
         while (last > 0 && !inside[last - 1])
@@ -33,13 +35,13 @@ LOOP void count_bits(
 
 /* --- Dilation and erosion --------------------------------------------------------------------- */
 
-/* The bits of a row's last word that lie within the width. */
+/* Return the bits of a row's last word that lie within the width. */
 PART uint64_t within(int64_t width)
 {
     return width % 64 ? ((uint64_t)1 << width % 64) - 1 : ~(uint64_t)0;
 }
 
-/* Set, or clear, what lies between rows and beyond their width. */
+/* Give all pixels between the rows and beyond their width the value of `beyond`. */
 PART void surround(uint64_t *wide, int64_t size, int64_t across, int64_t width, uint64_t beyond)
 {
     uint64_t inside = within(width);
@@ -50,7 +52,9 @@ PART void surround(uint64_t *wide, int64_t size, int64_t across, int64_t width, 
     }
 }
 
-/* Set each pixel of `wider` that is set in `wide`, or `step` pixels left or right; not the ends. */
+/* Set a pixel of `wider` if `wide` has a set pixel there, or `step` pixels to its left or right.
+ *
+ * The first and the last word are not written. */
 PART void widen(const uint64_t *restrict wide, uint64_t *restrict wider, int64_t size, int step)
 {
     int back = 64 - step;
@@ -61,33 +65,38 @@ PART void widen(const uint64_t *restrict wide, uint64_t *restrict wider, int64_t
     }
 }
 
+/* Set the pixels of `grown` that are set in `more`. */
 PART void unite(uint64_t *restrict grown, const uint64_t *restrict more, int64_t size)
 {
     for (int64_t word = 0; word < size; word++)
         grown[word] |= more[word];
 }
 
-/* The mask's rows lie in one array, with a word between them for what is outside the image:
+/* Dilate a mask by an element, or erode it.
+ *
+ * The mask's rows lie in one array. A word between two rows holds the pixels outside the image:
  *
  *     wide:   | . | row 0 | . | row 1 | . | row 2 | . |      across = words in a row + 1
  *
- * so that the row that lies `away` rows below is the one away * across words later, and each step
- * below is one long loop, which runs in vector instructions.
+ * The row that lies `away` rows below therefore begins away * across words later, and each step is
+ * one long loop, which runs in vector instructions.
  *
- * The element is a stack of stretches that narrow with the distance from its middle row:
+ * The element is a stack of stretches. A stretch is narrower the farther it is from the middle row:
  *
  *     away 2       # #          reach[2] = 1
  *     away 1     # # # #        reach[1] = 2
  *     away 0   # # # # # #      reach[0] = 3
  *
- * They are taken from the outermost inwards. Before each, `wide` is the mask widened by `done`
- * pixels to either side; widened further until `done` is reach[away] it is united with `grown`,
- * moved up and down by `away` rows. So no widening is done twice.
+ * The loop goes from the outermost stretch to the middle row. `wide` is the mask, widened by
+ * `done` pixels to the left and to the right. For each stretch `wide` is widened until `done` is
+ * reach[away]. Then it is moved up and down by `away` rows, and united with `grown`. So no
+ * widening is repeated.
  *
- * Each word is XORed with `changed`, 0 or all ones, as it is read and as it is written: to erode is
- * to dilate the complement, with ones around the image, and to take the complement again.
+ * To erode a mask, the loop dilates its complement, with ones around the image, and returns the
+ * complement of the result. For that it XORs each word with `changed`, which is 0 or all ones, when
+ * it reads the word and when it writes it.
  *
- * `room`: 3 * (1 + height * (words + 1)). */
+ * `room` has 3 * (1 + height * (words + 1)) elements. */
 PART void grow(
     const uint64_t *restrict bits, int64_t height, int64_t width, const int64_t *reach,
     int64_t reaches, uint64_t changed, uint64_t *room, uint64_t *restrict result)
@@ -101,9 +110,9 @@ PART void grow(
     memset(grown, 0, (size_t)size * sizeof *grown);
     for (int64_t away = reaches - 1; away >= 0; away--) {
         while (done < reach[away]) {
-            /* A set pixel is by now a stretch of 2 done + 1, or of done + 1 where the image's side
-             * cuts it off: moved by no more than done + 1 it leaves no gap. A word moves by 63
-             * bits at most. */
+            /* A set pixel has become a stretch of 2 * done + 1 pixels, or of done + 1 at the side
+             * of the image. If it moves by at most done + 1 pixels, no gap remains. A word cannot
+             * move by more than 63 bits. */
             int64_t step = least(least(reach[away] - done, done + 1), 63);
             widen(wide, spare, size, (int)step);
             uint64_t *other = wide;
@@ -118,7 +127,7 @@ PART void grow(
                 unite(grown, wide + away * across, rest);
         }
     }
-    /* What is outside is set where `changed` is, and has reached the first and the last rows. */
+    /* If `changed` is all ones, the ones outside the image have spread into its outer rows. */
     int64_t edge = least(reaches - 1, height);
     for (int64_t y = 0; y < height; y++) {
         uint64_t reached = y < edge || y >= height - edge ? changed : 0;

@@ -1,16 +1,19 @@
-/* Loops over the pixels of an image: tables of colours, and the distance of Eq. 2. */
+/* Loops over the pixels of an image: they look colours up, and compute the distance of Eq. 2. */
 
 #include <math.h>
 
 #include "loops.h"
 
-/* `codes` as many as pixels; `histogram` 256; `row`: `width` for what lies between two steps. */
+/* Look every pixel up by the sum and the minimum of its channels.
+ *
+ * `codes` has an element for each pixel, `histogram` has 256. `row` is working memory of `width`
+ * elements. */
 LOOP void look_up_sum_min(
     const uint8_t *restrict red, const uint8_t *restrict green, const uint8_t *restrict blue,
     int64_t height, int64_t width, const uint8_t *restrict table,
     uint8_t *restrict codes, int64_t *restrict histogram, int32_t *restrict row)
 {
-    /* Four counters for each code, so that equal neighbours need not wait for each other. */
+    /* With four counters for each code, a pixel need not wait for an equal neighbour's count. */
     int32_t counters[4][256] = {{0}};
     for (int64_t y = 0; y < height; y++) {
         const uint8_t *r = red + y * width, *g = green + y * width, *b = blue + y * width;
@@ -25,17 +28,18 @@ LOOP void look_up_sum_min(
         for (int64_t x = 0; x < width; x++)
             counters[x & 3][code[x]]++;
     }
-    for (int each = 0; each < 256; each++) {
-        histogram[each] = 0;
+    for (int code = 0; code < 256; code++) {
+        histogram[code] = 0;
         for (int counter = 0; counter < 4; counter++)
-            histogram[each] += counters[counter][each];
+            histogram[code] += counters[counter][code];
     }
 }
 
-/* A bound on the rounding of a distance near the limit in single precision.
+/* Return a bound on the rounding error of a distance near the limit in single precision.
  *
- * A rounding is 2^-24 of a number. Each of the three components is off by six roundings of
- * `reach`, their norm by sqrt(3) times as much, and by three more of its own: 16 are enough. */
+ * One rounding changes a number by at most 2^-24 of it. Each of the three components has an error
+ * of at most six roundings of `reach`. The norm has sqrt(3) times that error, and three roundings
+ * of its own. So 16 roundings are enough. */
 PART double rounding(const double *w, double limit)
 {
     double reach = 0;
@@ -46,7 +50,7 @@ PART double rounding(const double *w, double limit)
     return 16 * 0x1p-24 * (reach + limit);
 }
 
-/* |W (x - m)|^2 in double and in single precision. */
+/* Return |W (x - m)|^2 in double precision. */
 PART double squared(double r, double g, double b, const double *m, const double *w)
 {
     r -= m[0], g -= m[1], b -= m[2];
@@ -55,6 +59,7 @@ PART double squared(double r, double g, double b, const double *m, const double 
     return first * first + second * second + third * third;
 }
 
+/* Return |W (x - m)|^2 in single precision. */
 PART float squared_single(float r, float g, float b, const float *m, const float *w)
 {
     r -= m[0], g -= m[1], b -= m[2];
@@ -63,20 +68,22 @@ PART float squared_single(float r, float g, float b, const float *m, const float
     return first * first + second * second + third * third;
 }
 
-/* Twice as many numbers of single precision fit into a vector, and it decides nearly every pixel.
- * Those that lie too close to the limit for it are decided in double precision. */
+/* Compute the distance of every pixel, and decide which pixels are near.
+ *
+ * Single precision is faster, because twice as many numbers fit into a vector, and it decides
+ * nearly every pixel. Double precision decides the pixels that lie too close to the limit. */
 LOOP void mahalanobis(
     const uint8_t *restrict red, const uint8_t *restrict green, const uint8_t *restrict blue,
     int64_t height, int64_t width, const double *mean, const double *whitening, double greatest,
     float *restrict distance, uint8_t *restrict near)
 {
     float m[3], w[9];
-    for (int each = 0; each < 3; each++)
-        m[each] = (float)mean[each];
-    for (int each = 0; each < 9; each++)
-        w[each] = (float)whitening[each];
+    for (int channel = 0; channel < 3; channel++)
+        m[channel] = (float)mean[channel];
+    for (int place = 0; place < 9; place++)
+        w[place] = (float)whitening[place];
     double limit = sqrt(greatest), error = rounding(whitening, limit);
-    float surely = (float)(limit - error), perhaps = (float)(limit + error);
+    float lower_limit = (float)(limit - error), upper_limit = (float)(limit + error);
     for (int64_t y = 0; y < height; y++) {
         const uint8_t *r = red + y * width, *g = green + y * width, *b = blue + y * width;
         float *d = distance + y * width;
@@ -84,16 +91,18 @@ LOOP void mahalanobis(
         for (int64_t x = 0; x < width; x++)
             d[x] = sqrtf(squared_single(r[x], g[x], b[x], m, w));
         for (int64_t x = 0; x < width; x++) {
-            n[x] = d[x] <= surely;
-            undecided |= n[x] ^ (uint8_t)(d[x] <= perhaps);
+            n[x] = d[x] <= lower_limit;
+            undecided |= n[x] ^ (uint8_t)(d[x] <= upper_limit);
         }
         for (int64_t x = 0; undecided && x < width; x++)
-            if (surely < d[x] && d[x] <= perhaps)
+            if (lower_limit < d[x] && d[x] <= upper_limit)
                 n[x] = squared(r[x], g[x], b[x], mean, whitening) <= greatest;
     }
 }
 
-/* `words` and `bits`: `width` for what lies between two steps. */
+/* Look every pixel up in a table over all colours, which has a bit for each colour.
+ *
+ * `words` and `bits` are working memory of `width` elements. */
 LOOP void look_up_colours(
     const uint8_t *restrict red, const uint8_t *restrict green, const uint8_t *restrict blue,
     int64_t height, int64_t width, const uint64_t *restrict road,
@@ -101,13 +110,13 @@ LOOP void look_up_colours(
 {
     for (int64_t y = 0; y < height; y++) {
         const uint8_t *r = red + y * width, *g = green + y * width, *b = blue + y * width;
-        uint8_t *found = result + y * width;
-        /* A row at a time: where its colours stand is found in vector instructions. */
+        uint8_t *is_road = result + y * width;
+        /* The places of a row's colours in the table are computed in vector instructions. */
         for (int64_t x = 0; x < width; x++) {
             words[x] = (r[x] >> 2) << 12 | (g[x] >> 2) << 6 | b[x] >> 2;
             bits[x] = (uint8_t)((r[x] & 3) << 4 | (g[x] & 3) << 2 | (b[x] & 3));
         }
         for (int64_t x = 0; x < width; x++)
-            found[x] = road[words[x]] >> bits[x] & 1;
+            is_road[x] = road[words[x]] >> bits[x] & 1;
     }
 }

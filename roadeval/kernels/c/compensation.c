@@ -1,16 +1,20 @@
-/* Loops over the pixels of components and their rings: what Eq. 10 and 11 need.
+/* Loops over the pixels of components and their rings, for Eq. 10 and 11.
  *
- * A component's pixels are given by its runs, in the order of the rows, see runs.c. */
+ * The pixels of a component are its runs, in the order of the rows, see runs.c. */
 
 #include <math.h>
 #include <string.h>
 
 #include "loops.h"
 
-/* Pixels from which on a table of what becomes of each level is faster than computing it. */
+/* A component with more pixels gets a table of the new level of each level, which is then faster
+ * than computing the level of each pixel. */
 #define TABLED 256
 
-/* `sums`: seven for each label, cleared: pixels, R, G, B, and their squares. */
+/* Sum the colours of the runs of every label.
+ *
+ * `sums` has seven elements for each label: the number of pixels, the sums of R, G and B, and the
+ * sums of their squares. The caller sets them to 0. */
 LOOP void run_sums(
     const uint8_t *restrict red, const uint8_t *restrict green, const uint8_t *restrict blue,
     int64_t width, const run_t *restrict runs, int64_t count, int64_t *restrict sums)
@@ -31,7 +35,7 @@ LOOP void run_sums(
 
 /* --- Rings ------------------------------------------------------------------------------------ */
 
-/* Add the ring's pixels in a stretch of a row to a component. */
+/* Add the ring's pixels in a stretch of a row to the sums of a component. */
 PART void add(
     int64_t *restrict sum, RGB, const uint64_t *ring, int64_t row, int64_t start, int64_t end)
 {
@@ -55,21 +59,24 @@ PART void add(
     sum[4] += r2, sum[5] += g2, sum[6] += b2;
 }
 
-/* The ring pixels of row y that belong to a component are those within `reach` columns of one of
- * its runs in the rows y - reach to y + reach. With a reach of 1 and one component:
+/* Sum the colours of every component's ring.
+ *
+ * A ring pixel of row y belongs to a component if it lies within `reach` columns of one of the
+ * component's runs in the rows y - reach to y + reach. With a reach of 1 and one component:
  *
  *     row y - 1      . . . # # # . . . . .
  *     row y          . o o o o o o o o o .     o: columns 1 to 9
  *     row y + 1      . . # # . . # # # . .
  *
- * The widened runs overlap, and a pixel must count once. So the runs of all these rows are merged
- * from left to right by their first columns (`upcoming` is the next one of each row), and
- * `reached` is the invariant: all of the component's pixels in row y left of that column have been
- * counted. A widened run adds what lies right of it, and moves it to its own end. It is kept as
- * y * width + column, so that what is left from an earlier row needs no clearing.
+ * The widened runs overlap, but each pixel must be counted once. So the loop takes the runs of all
+ * these rows from left to right by their first columns; `upcoming` is the next run of each row.
+ * `reached` is the invariant: all pixels of the component in row y that lie left of this column are
+ * counted already. A widened run adds its pixels from this column on, and moves the column to its
+ * end. The column is stored as y * width + column, so it need not be cleared before the next row.
  *
- * `first`: each row's first run, with `reach` empty rows above and below the image, and one more;
- * `sums`: seven for each label, `reached`: one, all cleared; `merge`: three times 2 reach + 1. */
+ * `first` has the first run of each row, with `reach` empty rows above and below the image, and one
+ * element more. `sums` has seven elements for each label, and `reached` has one. The caller sets
+ * them to 0. `merge` is working memory of 3 * (2 * reach + 1) elements. */
 LOOP void ring_sums(
     const uint8_t *red, const uint8_t *green, const uint8_t *blue,
     int64_t height, int64_t width, const run_t *runs, const int64_t *first,
@@ -77,18 +84,18 @@ LOOP void ring_sums(
     int64_t *restrict sums, int64_t *restrict reached, int64_t *restrict merge)
 {
     const int64_t rows = 2 * reach + 1;
-    /* For each row within reach: its next run, where that starts, and the run after its last. */
+    /* Each row within reach has its next run, the start of that run, and the run after its last. */
     int64_t *upcoming = merge, *starts = merge + rows, *ends = merge + 2 * rows;
     for (int64_t y = 0; y < height; y++) {
-        for (int64_t each = 0; each < rows; each++) {
-            upcoming[each] = first[y + each], ends[each] = first[y + each + 1];
-            starts[each] = upcoming[each] < ends[each] ? runs[upcoming[each]].start : width;
+        for (int64_t row = 0; row < rows; row++) {
+            upcoming[row] = first[y + row], ends[row] = first[y + row + 1];
+            starts[row] = upcoming[row] < ends[row] ? runs[upcoming[row]].start : width;
         }
         for (;;) {
             int64_t row = 0, leftmost = starts[0];
-            for (int64_t each = 1; each < rows; each++) {
-                row = starts[each] < leftmost ? each : row;
-                leftmost = least(leftmost, starts[each]);
+            for (int64_t other = 1; other < rows; other++) {
+                row = starts[other] < leftmost ? other : row;
+                leftmost = least(leftmost, starts[other]);
             }
             if (leftmost == width)
                 break;
@@ -109,14 +116,18 @@ LOOP void ring_sums(
 
 /* --- Transfer --------------------------------------------------------------------------------- */
 
+/* Return the level that a level becomes, rounded and clipped. */
 PART uint8_t moved(double level, double source, double target, double gain)
 {
     double value = rint(target + (level - source) * gain);
     return (uint8_t)(value > 0 ? (value < 255 ? value : 255) : 0);
 }
 
-/* `image`: changed in place. `source`, `target`, `gain`: three for each of `count` labels.
- * `pixels`: of each label, cleared. `tables`: 768 for each label with more than TABLED pixels. */
+/* Map the colours of each component to its target.
+ *
+ * `image` is changed in place. `source`, `target` and `gain` have three elements for each of
+ * `count` labels. `pixels` has one element for each label, which the caller sets to 0. `tables` has
+ * 768 elements for each label with more than TABLED pixels. */
 LOOP void transfer(
     uint8_t *restrict image, int64_t width, const run_t *restrict runs, int64_t run_count,
     const double *restrict source, const double *restrict target, const double *restrict gain,
@@ -124,7 +135,7 @@ LOOP void transfer(
 {
     for (const run_t *run = runs; run < runs + run_count; run++)
         pixels[run->label] += run->end - run->start;
-    /* From here on `pixels` is the place of a label's table, or -1. */
+    /* From here on `pixels` holds the place of each label's table, or -1 if it has none. */
     int64_t place = 0;
     for (int64_t k = 0; k < count; k++) {
         if (pixels[k] <= TABLED) {

@@ -1,11 +1,12 @@
-/* Geodesic distances: the length of the cheapest path from seeds to each pixel. */
+/* Geodesic distances: the length of the cheapest path from the seeds to each pixel. */
 
 #include "loops.h"
 
-/* As in plain/geodesics.py: further than any path is told apart. */
+/* No distance is greater, as in plain.py. */
 #define FAR (1 << 30)
 
-/* A step costs 5 straight and 7 aslant, times the costs of both its pixels. */
+/* A step costs the sum of its two pixels' costs, times 5 if it is straight, or 7 if it is
+ * diagonal. */
 #define STRAIGHT 5
 #define ASLANT 7
 
@@ -34,7 +35,7 @@ PART void along_row(const uint16_t *cost, int64_t width, int32_t *restrict dista
         distance[x] = last = lesser(distance[x], last + STRAIGHT * (cost[x] + cost[x + 1]));
 }
 
-/* `distance`: of each pixel, 0 where it is a seed. */
+/* Compute the length of the cheapest path to each pixel; a seed has the distance 0. */
 LOOP void geodesics(
     const uint16_t *cost, const uint8_t *seeds, int64_t height, int64_t width, int64_t rounds,
     int32_t *restrict distance)
@@ -44,14 +45,14 @@ LOOP void geodesics(
     if (width == 0)
         return;
     for (int64_t sweep = 0; sweep < 2 * rounds; sweep++) {
-        /* Up, then down. */
+        /* A sweep goes up, the next one goes down. */
         int64_t step = sweep % 2 ? width : -width;
         int64_t row = sweep % 2 ? 0 : (height - 1) * width;
         for (int64_t y = 0; y < height; y++, row += step) {
-            const uint16_t *own = cost + row;
+            const uint16_t *costs = cost + row;
             if (y > 0)
-                across_rows(own, own - step, distance + row - step, width, distance + row);
-            along_row(own, width, distance + row);
+                across_rows(costs, costs - step, distance + row - step, width, distance + row);
+            along_row(costs, width, distance + row);
         }
     }
 }

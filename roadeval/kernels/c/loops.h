@@ -1,17 +1,17 @@
-/* What all loops share, and what they are called with.
+/* This file declares the loops, and defines the macros and small functions that they share.
  *
- * A loop's definition is the function of the same name in roadeval/kernels/plain, bit for bit.
- * module.c checks its arrays, and roadeval/kernels/compiled.py allocates what it writes: no loop
- * allocates, fails or keeps anything, so that any number of threads may run them. Arrays are
- * C-contiguous; sizes are in elements. */
+ * The function of the same name in roadeval/kernels/plain.py defines each loop, bit for bit.
+ * module.c checks the arrays of a loop, and roadeval/kernels/compiled.py allocates the arrays that
+ * it writes. No loop allocates memory, fails or keeps a state, so several threads may run one at
+ * the same time. Arrays are C-contiguous. Sizes are in elements. */
 #ifndef ROADEVAL_LOOPS_H
 #define ROADEVAL_LOOPS_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* A loop. Where it can choose at run time, the compiler makes several of it, with the vector
- * instructions of newer processors and without. */
+/* LOOP marks a loop. If the system can choose at run time, the compiler makes several versions of
+ * the loop: one without the vector instructions of newer processors, and others with them. */
 #if defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && __GNUC__ >= 12
 #define LOOP __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
 #elif defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
@@ -20,7 +20,7 @@
 #define LOOP
 #endif
 
-/* A part of a loop, always within it: its code follows the loop's instructions. */
+/* PART marks a function that is always inlined, so it uses the vector instructions of its loop. */
 #if defined(__GNUC__)
 #define PART static inline __attribute__((always_inline))
 #else
@@ -31,12 +31,12 @@
 #define restrict __restrict
 #endif
 
-/* A run is a stretch of a row, [start, end), with its label: see `components` in plain/runs.py. */
+/* A run is a stretch of a row, [start, end), with its label: see `components` in plain.py. */
 typedef struct {
     int32_t row, start, end, label;
 } run_t;
 
-/* What each parameter is stands where the loop is defined. */
+/* A comment at the definition of each loop describes its parameters. */
 #define RGB const uint8_t *red, const uint8_t *green, const uint8_t *blue
 
 void look_up_sum_min(
@@ -90,7 +90,7 @@ void label_rows(
 PART int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 PART int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }
 
-/* The number of set bits of a word. */
+/* Return the number of set bits of a word. */
 PART int64_t ones(uint64_t word) {
 #if defined(__GNUC__)
     return __builtin_popcountll(word);
@@ -102,7 +102,7 @@ PART int64_t ones(uint64_t word) {
 #endif
 }
 
-/* The place of the lowest set bit of a word that has one. */
+/* Return the place of the lowest set bit of a word; at least one bit must be set. */
 PART int64_t lowest(uint64_t word) {
 #if defined(__GNUC__)
     return __builtin_ctzll(word);

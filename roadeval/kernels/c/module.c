@@ -1,15 +1,15 @@
-/* The Python module of the loops: what each takes, and the call itself.
+/* The Python module of the loops. It checks the arguments of each loop and calls it.
  *
- * An array is taken by the buffer protocol and never copied. Its element type, dimensions and order
- * are checked; that shapes fit together is checked by roadeval/kernels/compiled.py. While a loop
- * runs the interpreter lock is released. */
+ * It reads arrays by the buffer protocol and never copies them. It checks the element type, the
+ * dimensions and the order of each array; roadeval/kernels/compiled.py checks whether the shapes
+ * fit together. The interpreter lock is released while a loop runs. */
 
 #define Py_LIMITED_API 0x030b0000
 #include <Python.h>
 
 #include "loops.h"
 
-/* More than any loop takes. */
+/* No loop takes more arguments. */
 #define MOST 16
 
 typedef struct {
@@ -17,19 +17,19 @@ typedef struct {
         void *array;
         int64_t size;
         double number;
-    } given[MOST];
+    } values[MOST];
     Py_buffer views[MOST];
-    int held;
+    int view_count;
 } taken_t;
 
 static void release(taken_t *taken)
 {
-    while (taken->held > 0)
-        PyBuffer_Release(&taken->views[--taken->held]);
+    while (taken->view_count > 0)
+        PyBuffer_Release(&taken->views[--taken->view_count]);
 }
 
-/* Return whether a buffer's elements are of a type: NumPy has two letters for 64 bits. */
-static bool is_of(const Py_buffer *view, char type)
+/* Return whether a buffer's elements are of a type. NumPy has two letters for some types. */
+static bool has_type(const Py_buffer *view, char type)
 {
     const char *format = view->format ? view->format : "B";
     if (format[0] == '\0' || format[1] != '\0')
@@ -45,15 +45,15 @@ static bool is_of(const Py_buffer *view, char type)
     return format[0] == type;
 }
 
-/* Take arguments as `kinds` has them, and return whether they are of these kinds.
+/* Read the arguments, and return whether they are of the kinds that `kinds` lists.
  *
- * A kind is n, a size or a flag; d, a number; or an array: the type of its elements by the letter
- * of Python's module `struct`, and how many dimensions it has. Before that a > stands where the
- * loop writes. */
+ * The kind n is a size or a flag, and the kind d is a number. The kind of an array is the type of
+ * its elements, as a letter of Python's module `struct`, and then its number of dimensions. A >
+ * stands before the kind of an array that the loop writes. */
 static bool take(
     taken_t *taken, const char *kinds, PyObject *const *arguments, Py_ssize_t count)
 {
-    taken->held = 0;
+    taken->view_count = 0;
     Py_ssize_t place = 0;
     for (const char *kind = kinds; *kind; kind++) {
         if (*kind == ' ')
@@ -64,27 +64,27 @@ static bool take(
         }
         PyObject *argument = arguments[place];
         if (*kind == 'n') {
-            taken->given[place++].size = PyLong_AsLongLong(argument);
+            taken->values[place++].size = PyLong_AsLongLong(argument);
         } else if (*kind == 'd' && (kind[1] == ' ' || kind[1] == '\0')) {
-            taken->given[place++].number = PyFloat_AsDouble(argument);
+            taken->values[place++].number = PyFloat_AsDouble(argument);
         } else {
             bool written = *kind == '>';
             kind += written;
             char type = *kind++;
-            Py_buffer *view = &taken->views[taken->held];
+            Py_buffer *view = &taken->views[taken->view_count];
             int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (written ? PyBUF_WRITABLE : 0);
             if (PyObject_GetBuffer(argument, view, flags) < 0) {
                 PyErr_Format(PyExc_TypeError, "argument %zd is no C-contiguous array", place);
                 break;
             }
-            taken->held++;
-            if (!is_of(view, type) || view->ndim != *kind - '0') {
+            taken->view_count++;
+            if (!has_type(view, type) || view->ndim != *kind - '0') {
                 PyErr_Format(
                     PyExc_TypeError, "argument %zd has %d dimensions of type %s, not %c of %c",
                     place, view->ndim, view->format ? view->format : "B", *kind, type);
                 break;
             }
-            taken->given[place++].array = view->buf;
+            taken->values[place++].array = view->buf;
         }
         if (PyErr_Occurred())
             break;
@@ -97,25 +97,25 @@ static bool take(
     return false;
 }
 
-#define ARRAY(place) taken.given[place].array
-#define SIZE(place) taken.given[place].size
-#define NUMBER(place) taken.given[place].number
+#define ARRAY(place) taken.values[place].array
+#define SIZE(place) taken.values[place].size
+#define NUMBER(place) taken.values[place].number
 #define PLANES ARRAY(0), ARRAY(1), ARRAY(2), SIZE(3), SIZE(4)
 
-/* A function of the module: its name, the kinds that it takes, and the call that it makes. */
+/* FUNCTION defines a function of the module: its name, the kinds of its arguments, its call. */
 #define FUNCTION(name, kinds, call) \
     static PyObject *call_##name( \
         PyObject *Py_UNUSED(self), PyObject *const *arguments, Py_ssize_t count) \
     { \
         taken_t taken; \
-        int64_t found = 0; \
+        int64_t result = 0; \
         if (!take(&taken, kinds, arguments, count)) \
             return NULL; \
         Py_BEGIN_ALLOW_THREADS \
         call; \
         Py_END_ALLOW_THREADS \
         release(&taken); \
-        return PyLong_FromLongLong(found); \
+        return PyLong_FromLongLong(result); \
     }
 
 FUNCTION(look_up_sum_min, "B2 B2 B2 n n B2 >B2 >q1 >i1",
@@ -139,7 +139,7 @@ FUNCTION(transfer, ">B3 n i2 n d2 d2 d2 n >q1 >B1",
         ARRAY(8), ARRAY(9)))
 
 FUNCTION(components, "Q2 n n n >q1 >i1 >i1 >q1 >i2",
-    found = components(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6),
+    result = components(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6),
         ARRAY(7), ARRAY(8)))
 
 FUNCTION(keep_region, "Q2 n n >q1 >i1 >i1 >q1 >q1 >Q2",

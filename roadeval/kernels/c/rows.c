@@ -6,7 +6,8 @@
 
 enum { NONE = 0, PAETH = 4 };
 
-/* Of left, above, and the byte above the left one, that which is nearest to left + above - it. */
+/* Return the Paeth predictor: of left, above and corner the byte that is nearest to
+ * left + above - corner. The corner is the byte above the left one. */
 PART uint8_t nearest(int left, int above, int corner)
 {
     int to_left = abs(above - corner), to_above = abs(left - corner);
@@ -16,7 +17,9 @@ PART uint8_t nearest(int left, int above, int corner)
     return (uint8_t)(to_above <= to_corner ? above : corner);
 }
 
-/* `rows`: height x size. `lines`: height x (1 + size), each row filtered by PAETH. */
+/* Subtract the Paeth predictor from each byte.
+ *
+ * `rows` has height x size elements. `lines` has height x (1 + size). */
 LOOP void filter_rows(
     const uint8_t *restrict rows, int64_t height, int64_t size, int64_t step,
     uint8_t *restrict lines)
@@ -26,8 +29,8 @@ LOOP void filter_rows(
         const uint8_t *row = rows + y * size, *above = y > 0 ? row - size : row;
         uint8_t *restrict line = lines + y * (1 + size) + 1;
         line[-1] = PAETH;
-        /* In the first pixel left and corner are 0, and above is nearest; in the first row above and
-         * corner are 0, and left is. */
+        /* In the first pixel left and corner are 0, so above is the nearest byte. In the first row
+         * above and corner are 0, so left is the nearest byte. */
         for (int64_t byte = 0; byte < first; byte++)
             line[byte] = (uint8_t)(row[byte] - (y > 0 ? above[byte] : 0));
         if (y > 0)
@@ -40,27 +43,31 @@ LOOP void filter_rows(
     }
 }
 
-/* `bits` is a constant wherever this is used. */
+/* Pack a row of labels. Every caller gives a constant for `bits`, so the compiler unrolls the
+ * loops. */
 PART void pack_row(
     const uint8_t *restrict labels, int64_t width, int bits, uint8_t *restrict line)
 {
-    int64_t each = 8 / bits, whole = width / each;
+    int64_t per_byte = 8 / bits, whole = width / per_byte;
     unsigned most = (1u << bits) - 1;
     for (int64_t byte = 0; byte < whole; byte++) {
         unsigned packed = 0;
-        for (int64_t place = 0; place < each; place++)
-            packed = packed << bits | (labels[byte * each + place] & most);
+        for (int64_t place = 0; place < per_byte; place++)
+            packed = packed << bits | (labels[byte * per_byte + place] & most);
         line[byte] = (uint8_t)packed;
     }
-    if (whole * each < width) {
+    if (whole * per_byte < width) {
         unsigned packed = 0;
-        for (int64_t place = whole * each; place < (whole + 1) * each; place++)
+        for (int64_t place = whole * per_byte; place < (whole + 1) * per_byte; place++)
             packed = packed << bits | (place < width ? labels[place] & most : 0);
         line[whole] = (uint8_t)packed;
     }
 }
 
-/* `labels`: height x width; `bits`: 2, 4 or 8. `lines`: height x (1 + bytes of a row). */
+/* Pack labels, the leftmost into a byte's highest bits.
+ *
+ * `labels` has height x width elements. `bits` is 2, 4 or 8. `lines` has height x (1 + bytes of a
+ * row) elements. */
 LOOP void label_rows(
     const uint8_t *restrict labels, int64_t height, int64_t width, int bits,
     uint8_t *restrict lines)

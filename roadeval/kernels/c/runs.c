@@ -1,23 +1,23 @@
-/* Loops over masks by runs: components and holes.
+/* Loops over the runs of masks: they find components and holes.
  *
  * A run is a stretch of equal pixels in a row, from `start` up to but not including `end`. A mask
- * that was opened and closed has a few of them a row, so that what is asked of its components is
- * asked of some thousand runs instead of all pixels.
+ * that was opened and closed has only a few runs in each row. So a loop over its components visits
+ * some thousand runs instead of all pixels.
  *
- * A mask is `height` rows of `words`, see bits.c. `rows`, one more than rows, `starts` and `ends`,
- * width / 2 + 1 a row, and `parents`, as many, are given by the caller as room to work in. */
+ * A mask is an array of `height` rows of words, see bits.c. The caller allocates working memory:
+ * `rows` has height + 1 elements; `starts`, `ends` and `parents` have width / 2 + 1 a row. */
 
 #include "loops.h"
 
-/* Find the runs of ones (or of zeros, if not `inside`), row after row, and return how many.
+/* Find the runs of ones (or of zeros, if not `inside`), row after row, and return their number.
  *
- * Those of row y are numbered from rows[y] up to but not including rows[y + 1]. A word is walked
- * from turn to turn, a bit that differs from the one to its left:
+ * The runs of row y have the numbers from rows[y] up to but not including rows[y + 1]. The loop
+ * goes from turn to turn. A turn is a bit that differs from the bit to its left:
  *
- *     here     . . # # # . . # #      before the first stands a 0
- *     turns    . . ^ . . ^ . ^ .      a run begins at 2, ends at 5, begins at 7
+ *     here     . . # # # . . # #      the bit before the first counts as 0
+ *     turns    . . ^ . . ^ . ^ .      a run begins at 2 and ends at 5, the next begins at 7
  *
- * Turns alternate between beginning and end; a run that no turn ends, ends with the row. */
+ * Turns begin and end runs alternately. If no turn ends a run, it ends with the row. */
 PART int64_t find_runs(
     const uint64_t *bits, int64_t height, int64_t width, bool inside,
     int64_t *restrict rows, int32_t *restrict starts, int32_t *restrict ends)
@@ -50,6 +50,7 @@ PART int64_t find_runs(
     return count;
 }
 
+/* Return the first run of a run's component. */
 PART int64_t first_of(int64_t *parents, int64_t run)
 {
     while (parents[run] != run)
@@ -57,9 +58,10 @@ PART int64_t first_of(int64_t *parents, int64_t run)
     return run;
 }
 
-/* Join runs of neighbouring rows that touch: `parents` becomes of each the first of its component.
+/* Join the runs of neighbouring rows that touch. `parents` holds for each run the first run of its
+ * component.
  *
- * With `corner` 1 they may touch by a corner (8-connected), with 0 by a side alone. */
+ * If `corner` is 1, runs may touch at a corner (8-connected); else they must share a side. */
 PART void join_runs(
     const int64_t *rows, const int32_t *starts, const int32_t *ends, int64_t height, int corner,
     int64_t *parents)
@@ -73,12 +75,13 @@ PART void join_runs(
                 int64_t a = first_of(parents, above), b = first_of(parents, here);
                 parents[a] = parents[b] = parents[here] = least(a, b);
             }
-            /* Whichever ends first is done with. Not a branch, which no processor could foresee. */
-            int64_t done = ends[above] < ends[here];
-            above += done, here += 1 - done;
+            /* The loop leaves the run that ends first. A branch here would be slow, because no
+             * processor could predict it. */
+            int64_t above_ends = ends[above] < ends[here];
+            above += above_ends, here += 1 - above_ends;
         }
     }
-    /* A parent comes before its child, and is settled already. */
+    /* A parent comes before its child, so its own parent is final already. */
     for (int64_t run = 0; run < rows[height]; run++)
         parents[run] = parents[parents[run]];
 }
@@ -106,14 +109,15 @@ LOOP int64_t components(
     join_runs(rows, starts, ends, height, corner, parents);
     for (int64_t y = 0; y < height; y++)
         for (int64_t run = rows[y]; run < rows[y + 1]; run++) {
-            /* A component's number is its first run's, which comes before the others. */
+            /* The first run of a component comes before the others, and has its label already. */
             int32_t label = parents[run] == run ? ++count : runs[parents[run]].label;
             runs[run] = (run_t){(int32_t)y, starts[run], ends[run], label};
         }
     return count;
 }
 
-/* `votes`: as many as `parents`, cleared; `kept` cleared. */
+/* Keep the largest component. `votes` has as many elements as `parents`. The caller sets the
+ * elements of `votes` and `kept` to 0. */
 LOOP void keep_region(
     const uint64_t *bits, int64_t height, int64_t width,
     int64_t *rows, int32_t *starts, int32_t *ends, int64_t *parents, int64_t *votes,
@@ -124,7 +128,8 @@ LOOP void keep_region(
     join_runs(rows, starts, ends, height, 1, parents);
     for (int64_t run = 0; run < count; run++)
         votes[parents[run]] += ends[run] - starts[run];
-    /* A component's own number is its first run's: of equals the first from the top is found. */
+    /* The number of a component is that of its first run. If several components have the same size,
+     * the loop finds the topmost. */
     int64_t best = 0;
     for (int64_t run = 1; run < count; run++)
         best = votes[run] > votes[best] ? run : best;
@@ -134,7 +139,8 @@ LOOP void keep_region(
                 set_bits(kept + y * words, starts[run], ends[run]);
 }
 
-/* `filled`: a copy of `bits`; `outside` as many as `parents`, cleared. */
+/* Fill the holes of a mask. `filled` begins as a copy of `bits`. `outside` has as many elements as
+ * `parents`, and the caller sets them to 0. */
 LOOP void fill_holes(
     const uint64_t *bits, int64_t height, int64_t width,
     int64_t *rows, int32_t *starts, int32_t *ends, int64_t *parents, uint8_t *outside,

@@ -1,22 +1,22 @@
-/* Sum of decision trees: the classifier of roadeval/pipeline/beyond/trees.py. */
+/* The sum of decision trees: the classifier of roadeval/pipeline/beyond/trees.py. */
 
 #include <string.h>
 
 #include "loops.h"
 
-/* Pixels at a time: with a hundred features each, they stay in the second nearest cache. */
+/* The number of pixels in a block. With a hundred features, a block fits into the second cache. */
 #define BLOCK 256
 
-/* Leaves of a tree, at most: a bit each. */
+/* The greatest number of leaves of a tree. Each leaf has a bit. */
 #define LEAVES 32
 
-/* Nodes at a time. */
+/* The number of nodes that a pass over the block evaluates together. */
 #define ABREAST 4
 
-/* All bits if a value is above another, else none. */
+/* Return a word with all bits set if a value is above another, else 0. */
 PART uint32_t all_if_above(float value, float other) { return -(uint32_t)(value > other); }
 
-/* Rule out the leaves that a block's pixels cannot reach for what four nodes find. */
+/* Evaluate four nodes, and rule out the leaves that each pixel of a block can no longer reach. */
 PART void pass_nodes(
     const float *restrict block, const int32_t *feature, const float *threshold,
     const uint32_t *kept, uint32_t *restrict ruled_out)
@@ -34,8 +34,11 @@ PART void pass_nodes(
     }
 }
 
-/* `features`: `pixels` for each of `count`; `feature`, `threshold` and `kept`: `nodes`, a
- * multiple of ABREAST, for each of `trees`; `values`: LEAVES for each; `block`: BLOCK for each of `count`, to work in. */
+/* Compute the sum of the trees for each pixel.
+ *
+ * `features` has `pixels` elements for each of `count` features. `feature`, `threshold` and `kept`
+ * have `nodes` elements for each of `trees` trees; `nodes` is a multiple of ABREAST. `values` has
+ * LEAVES elements for each tree. `block` is working memory of BLOCK elements for each feature. */
 LOOP void tree_sum(
     const float *features, int64_t count, int64_t pixels, const int32_t *feature,
     const float *threshold, const uint32_t *kept, const float *values, int64_t trees,
@@ -44,11 +47,11 @@ LOOP void tree_sum(
     float total[BLOCK];
     uint32_t out[BLOCK];
     for (int64_t start = 0; start < pixels; start += BLOCK) {
-        /* The last block may be short: what lies beyond it is not handed out. */
+        /* The last block may have fewer pixels. Results beyond its end are not copied. */
         size_t size = (size_t)least(BLOCK, pixels - start) * sizeof(float);
         memset(total, 0, sizeof total);
-        for (int64_t each = 0; each < count; each++)
-            memcpy(block + each * BLOCK, features + each * pixels + start, size);
+        for (int64_t place = 0; place < count; place++)
+            memcpy(block + place * BLOCK, features + place * pixels + start, size);
         for (int64_t tree = 0; tree < trees; tree++) {
             int64_t first = tree * nodes;
             memset(out, 0, sizeof out);

@@ -105,19 +105,9 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
         rate_hz=rate,
         gaps=tuple((int(times[i]), int(times[i + 1])) for i in before),
     )
-    return _with_picture(topic, reader) if topic.is_image else topic
-
-
-def median_period(log_times: npt.NDArray[np.int64]) -> int:
-    """Return the median time between messages in nanoseconds; 0 below two messages."""
-    return int(np.median(np.diff(log_times))) if len(log_times) > 1 else 0
-
-
-def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
-    """Describe the first readable image of a topic.
-
-    Three messages are tried. A topic without a schema is one of images only if one is readable.
-    """
+    if not topic.is_image:
+        return topic
+    # Three messages are tried. A topic without a schema is one of images only if one is readable.
     problem, tries = "", 0
     for position in range(len(reader)):
         try:
@@ -128,6 +118,11 @@ def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
         if tries == 3:
             break
     return replace(topic, problem=problem) if topic.schema else replace(topic, kind=TopicKind.OTHER)
+
+
+def median_period(log_times: npt.NDArray[np.int64]) -> int:
+    """Return the median time between messages in nanoseconds; 0 below two messages."""
+    return int(np.median(np.diff(log_times))) if len(log_times) > 1 else 0
 
 
 def _describe_picture(reader: TopicReader, position: int) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data.arrays import Floats, Image
+from roadeval.data.arrays import Image
 from roadeval.images.decoding import size_of, to_rgb
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import LogError
@@ -42,13 +42,30 @@ def road_mask(truth: bytes) -> Image:
 def messages(folder: Path, name: str, image: bytes, frame_id: str) -> Iterator[tuple[str, Any]]:
     """Yield topics and messages: an image's calibration, and its camera's place over the road.
 
-    The camera is rectified and lies where ``P2`` has it, so its projection is K alone.
+    The camera is rectified and lies where ``P2`` has it, so its projection is K alone. A `LogError`
+    if a matrix of `_SHAPES` is missing, or impossible.
     """
     from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
     from scipy.spatial.transform import Rotation
 
-    projection, rectified, to_road = _read_matrices(folder / "calib" / f"{name}.txt")
+    file = folder / "calib" / f"{name}.txt"
+    with reading(file, LogError):
+        lines = file.read_text(errors="replace").splitlines()
+    numbers = {name: rest.split() for name, _, rest in (line.partition(":") for line in lines)}
+    matrices = []
+    for matrix_name, shape in _SHAPES.items():
+        try:
+            matrix = np.array(numbers[matrix_name], float).reshape(shape)
+        except (KeyError, ValueError) as error:
+            line = f"it has no line {matrix_name} of {shape[0] * shape[1]} numbers"
+            raise LogError(line, where=file) from error
+        turn = matrix[:, :3]
+        fits = matrix_name == "P2" or np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)
+        if not (fits and np.isfinite(matrix).all() and np.linalg.det(turn) > 0):
+            raise LogError(f"the numbers of {matrix_name} fit no camera", where=file)
+        matrices.append(matrix)
+    projection, rectified, to_road = matrices
     k, turn = projection[:, :3], to_road[:, :3] @ np.linalg.inv(rectified)
     lens: dict[str, Any] = {"K": k.ravel(), "R": np.eye(3).ravel(), "P": (k @ np.eye(3, 4)).ravel()}
     width, height = size_of(image, Limits())
@@ -60,21 +77,3 @@ def messages(folder: Path, name: str, image: bytes, frame_id: str) -> Iterator[t
     pose["translation"] = dict(zip("xyz", at, strict=True))
     pose["rotation"] = dict(zip("xyzw", quaternion, strict=True))
     yield "/tf_static", FrameTransform(**pose)
-
-
-def _read_matrices(file: Path) -> Iterator[Floats]:
-    """Yield the matrices of `_SHAPES`; a `LogError` if one is missing, or impossible."""
-    with reading(file, LogError):
-        lines = file.read_text(errors="replace").splitlines()
-    numbers = {name: rest.split() for name, _, rest in (line.partition(":") for line in lines)}
-    for name, shape in _SHAPES.items():
-        try:
-            matrix = np.array(numbers[name], float).reshape(shape)
-        except (KeyError, ValueError) as error:
-            line = f"it has no line {name} of {shape[0] * shape[1]} numbers"
-            raise LogError(line, where=file) from error
-        turn = matrix[:, :3]
-        fits = name == "P2" or np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)
-        if not (fits and np.isfinite(matrix).all() and np.linalg.det(turn) > 0):
-            raise LogError(f"the numbers of {name} fit no camera", where=file)
-        yield matrix

@@ -277,19 +277,17 @@ def sample_features(
     for index, (image, opinion) in enumerate(zip(sample.images, heard, strict=True)):
         here = np.flatnonzero(sample.frame == index)
         row, column = sample.row[here], sample.column[here]
-        flipped = np.ascontiguousarray(image[:, ::-1]), opinion and _mirror(opinion)
-        opposite = at(*flipped, row, image.shape[1] - 1 - column)
+        flipped = opinion
+        if opinion is not None and opinion.mask is not None:
+            mask = Packed.of(opinion.mask.pixels()[:, ::-1])
+            planes = (np.ascontiguousarray(p[:, ::-1]) for p in _probabilities(opinion))
+            flipped = Output(mask=mask, by_class=tuple(planes))
+        mirror = np.ascontiguousarray(image[:, ::-1])
+        opposite = at(mirror, flipped, row, image.shape[1] - 1 - column)
         parts.append((here, at(image, opinion, row, column), opposite))
     order, straight, mirrored = map(np.concatenate, zip(*parts, strict=True))
     back = np.argsort(order)
     return straight[back], mirrored[back]
-
-
-def _mirror(opinion: Output) -> Output:
-    assert opinion.mask is not None
-    mask = Packed.of(opinion.mask.pixels()[:, ::-1])
-    planes = tuple(np.ascontiguousarray(plane[:, ::-1]) for plane in _probabilities(opinion))
-    return Output(mask=mask, by_class=planes)
 
 
 SUNLIT: Final = 80

@@ -33,14 +33,10 @@ _FIGURE: Final = b"""
 """
 
 
-class ReportError(RoadevalError):
-    """The document cannot be written."""
-
-
 def typeset(document: Report) -> bytes:
     """Return a report as a PDF; equal reports give equal bytes.
 
-    A `ReportError` if the system's folder for temporary files cannot be written to.
+    A `RoadevalError` if the system's folder for temporary files cannot be written to.
     """
     inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
     data = json.dumps(document.as_json() | {"colours": inks}).encode()
@@ -53,7 +49,7 @@ def typeset_figure(
 ) -> bytes:
     """Return a figure as a PNG, or as a PDF of one page that has the figure's size.
 
-    A `ReportError` if the system's folder for temporary files cannot be written to.
+    A `RoadevalError` if the system's folder for temporary files cannot be written to.
     """
     return _compile({_MAIN: _FIGURE, "figure.svg": svg}, kind, pixels_per_inch)
 
@@ -92,7 +88,7 @@ def _compile(
                 ppi=pixels_per_inch,
             )
     except OSError as error:
-        raise ReportError(
+        raise RoadevalError(
             f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are made "
             f"there, and it cannot be written ({error.strerror}); make room, or name "
             "another folder with TMPDIR"

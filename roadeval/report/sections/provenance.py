@@ -9,7 +9,6 @@ from roadeval.data.words import UNSET, setting
 from roadeval.report.blocks import Block, Command, Details, Heading, KeepTogether, Table, Text
 from roadeval.report.captions import caption, note
 from roadeval.report.findings import Findings
-from roadeval.results.facts import Facts
 from roadeval.results.fleet import FleetFolder
 
 
@@ -23,7 +22,13 @@ def section(findings: Findings) -> Iterator[Block]:
         yield KeepTogether([Text(f"Log: {facts.log.path}"), digest, *again])
     for name, labels in facts.masks.items():
         yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
-    yield from _methods(facts)
+    # Stages, such as networks, describe themselves.
+    for variant, stages in facts.methods.items():
+        for stage, description in stages.items():
+            rows = dict(flatten(description))
+            if (seconds := facts.seconds.get(variant, {}).get(stage)) is not None:
+                rows["ms a frame"] = f"{1e3 * seconds:.2f}"
+            yield Details(f"{variant}: {stage}", [_words(["what", "value"], [*rows.items()])])
     details: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
     # The log's digest and the settings above tell more than the digest of the input.
     properties = [
@@ -50,16 +55,6 @@ def of_drives(findings: FleetFolder) -> Iterator[Block]:
     """Yield the version that replayed many drives, and the files with the settings."""
     yield Heading("What was run")
     yield Text(caption("run of a fleet", version=findings.facts.version, folder=findings.path))
-
-
-def _methods(facts: Facts) -> Iterator[Block]:
-    """Yield the descriptions that stages, such as networks, give of themselves, and their times."""
-    for variant, stages in facts.methods.items():
-        for stage, description in stages.items():
-            rows = dict(flatten(description))
-            if (seconds := facts.seconds.get(variant, {}).get(stage)) is not None:
-                rows["ms a frame"] = f"{1e3 * seconds:.2f}"
-            yield Details(f"{variant}: {stage}", [_words(["what", "value"], [*rows.items()])])
 
 
 def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

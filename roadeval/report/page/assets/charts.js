@@ -1,23 +1,24 @@
-// Values under the pointer; one range of frames for all charts along the drive.
+// The charts show the values under the pointer. All charts along the drive show the same range of frames.
 
 const SVG = "http://www.w3.org/2000/svg";
-const along = []; // The charts along the drive.
+const driveCharts = []; // These charts lie along the drive.
 const range = { drive: null, low: 0, high: 0, frames: null, onChange: [] };
 
+/** Return a new SVG element with its attributes and its text. */
 function svg(name, attributes, text = "") {
-  const made = document.createElementNS(SVG, name);
-  made.textContent = text;
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
+  const element = document.createElementNS(SVG, name);
+  element.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  return element;
 }
 
-/** The position in numbers that is nearest to a value. */
+/** Return the place of the number that is nearest to a value. */
 function nearest(numbers, value) {
-  const far = (place) => Math.abs(numbers[place] - value);
-  return numbers.reduce((best, _, place) => (far(place) < far(best) ? place : best), 0);
+  const distance = (place) => Math.abs(numbers[place] - value);
+  return numbers.reduce((best, _, place) => (distance(place) < distance(best) ? place : best), 0);
 }
 
-/** About so many round numbers in a range, at least so far from each other. */
+/** Return about `count` round numbers in a range, which are at least `least` apart. */
 function roundNumbers(low, high, count, least = 1) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
@@ -27,7 +28,7 @@ function roundNumbers(low, high, count, least = 1) {
   return numbers;
 }
 
-/** A name with its value, behind a variant's mark. */
+/** Return a line with a variant's mark, a name and its value. */
 function tipLine(name, value, mark = null) {
   const line = make("p");
   if (mark) {
@@ -39,7 +40,7 @@ function tipLine(name, value, mark = null) {
   return line;
 }
 
-/** A value with its interval, if it has one. */
+/** Return a value as text, with its interval if it has one. */
 function withEnds(value, low, high, unit) {
   if (value === null || value === undefined) return "\u2013";
   const written = (number) => `${unit === "points" && number > 0 ? "+" : ""}${number.toFixed(2)}`.replace("-", "\u2212");
@@ -47,6 +48,7 @@ function withEnds(value, low, high, unit) {
   return `${written(value)} ${unit}` + (hasEnds ? ` (${written(low)} to ${written(high)})` : "");
 }
 
+/** A chart with values on the y axis. */
 class ChartView {
   constructor(element, onFrame) {
     this.element = element;
@@ -65,6 +67,7 @@ class ChartView {
     this.listen(onFrame);
   }
 
+  /** Point by the pointer and the keys, choose a part by dragging, and go to a frame by a click. */
   listen(onFrame) {
     const { area } = this;
     let begin = null;
@@ -79,13 +82,13 @@ class ChartView {
     area.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       begin = this.at(event);
-      area.setPointerCapture(event.pointerId); // A part may end beside the chart.
+      area.setPointerCapture(event.pointerId); // The reader may release the pointer beside the chart.
     });
     area.addEventListener("pointerup", (event) => {
       const end = this.at(event);
-      const far = begin !== null && Math.abs(end - begin) > (this.high - this.low) / 60;
+      const isDragged = begin !== null && Math.abs(end - begin) > (this.high - this.low) / 60;
       this.select(null);
-      if (far) zoom(Math.min(begin, end), Math.max(begin, end));
+      if (isDragged) zoom(Math.min(begin, end), Math.max(begin, end));
       else if (begin !== null) onFrame(Math.round(this.snapped(end)));
       begin = null;
     });
@@ -95,9 +98,10 @@ class ChartView {
     });
   }
 
+  /** Move the pointer by the arrow keys; Enter goes to a frame, Escape shows the whole drive. */
   key(event, onFrame) {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (step && this.values.frames && this.element.classList.contains("low")) return; // The page goes to the next frame.
+    if (step && this.values.frames && this.element.classList.contains("low")) return; // The browser of frames handles this key.
     const { numbers } = this;
     const place = this.pointed === undefined ? 0 : nearest(numbers, this.pointed);
     if (step) pointAt(this, numbers[Math.min(Math.max(place + step, 0), numbers.length - 1)]);
@@ -108,22 +112,25 @@ class ChartView {
     event.stopPropagation();
   }
 
-  /** The place of a position, in percent of the chart. */
+  /** Return the place of a position in percent of the chart. */
   share(x) {
     const [first, last] = this.values.x;
     return (100 * (x - first)) / (last - first);
   }
 
+  /** Return the position under the pointer. */
   at(event) {
     const box = this.area.getBoundingClientRect();
     const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
     return this.low + share * (this.high - this.low);
   }
 
+  /** Return the position with a value that is nearest to a position. */
   snapped(x) {
     return this.numbers[nearest(this.numbers, x)] ?? x;
   }
 
+  /** Draw a line at the position with a value that is nearest to `x`; null removes the line. */
   point(x) {
     this.tip.hidden = true;
     this.cursor.removeAttribute("d");
@@ -132,32 +139,33 @@ class ChartView {
     this.cursor.setAttribute("d", `M${this.share(this.pointed)} 0V100`);
   }
 
-  /** The name of the position under the pointer. */
+  /** Return the name of the position under the pointer. */
   where() {
     const { across, frames, names, unit } = this.values;
     if (frames) return `frame ${Math.round(this.pointed)}`;
     return across ? `${across} ${this.pointed.toFixed(2)} ${unit}` : names[Math.round(this.pointed)];
   }
 
-  /** The place of a series' value at the position; -1 without a value near it. */
+  /** Return the place of a series' value at the position, or -1 if no value is near. */
   placeIn(series) {
     if (!series.x.length) return -1;
     const place = nearest(series.x, this.pointed);
     const near = this.values.across ? (this.high - this.low) / 50 : 0.5;
-    const far = Math.abs(series.x[place] - this.pointed) > near;
-    return far && !this.values.frames ? -1 : place;
+    const isFar = Math.abs(series.x[place] - this.pointed) > near;
+    return isFar && !this.values.frames ? -1 : place;
   }
 
-  /** The mark of a series in this figure's legend, or in a table of variants. */
+  /** Return the mark of a series from this figure's legend, or from a table of variants. */
   markOf(name) {
-    const names = [...(this.element.closest("figure")?.querySelectorAll(".legend li") ?? []), ...document.querySelectorAll(".with-dot")];
-    return names.find((part) => part.textContent.trim() === name)?.querySelector(".mark");
+    const entries = [...(this.element.closest("figure")?.querySelectorAll(".legend li") ?? []), ...document.querySelectorAll(".with-dot")];
+    return entries.find((entry) => entry.textContent.trim() === name)?.querySelector(".mark");
   }
 
   shownSeries() {
     return this.values.series.filter((series) => isShown(series.name));
   }
 
+  /** Show the values at the position in a box. */
   tell() {
     const [shown, { unit, level }] = [this.shownSeries(), this.values];
     const lines = shown.map((series) => {
@@ -175,6 +183,7 @@ class ChartView {
     this.tip.style.left = `${Math.max(0, Math.min(best, this.element.clientWidth - this.tip.offsetWidth))}px`;
   }
 
+  /** Mark the part that the reader drags over; null removes the mark. */
   select(from, to) {
     this.chosen?.remove();
     if (from === null) return;
@@ -183,6 +192,7 @@ class ChartView {
     this.area.append(this.chosen);
   }
 
+  /** Show a range of positions. */
   show(low, high) {
     [this.low, this.high] = [low, high];
     this.driveButton.hidden = !isPart();
@@ -197,13 +207,13 @@ class ChartView {
     this.element.querySelector(".xs").replaceChildren(
       ...ticks.map((tick) => {
         const place = (100 * (tick - low)) / (high - low);
-        // The last number stays inside.
+        // The last number stays inside the chart.
         return svg("text", { x: `${place}%`, y: 14, ...(place > 97 ? { class: "last" } : {}) }, tick);
       }),
     );
   }
 
-  /** Fit the axis of values to what is shown; returned are the top of the view and its height in percent. */
+  /** Fit the axis of values to the shown values. Return the top of the view and its height in percent. */
   fitValues() {
     const { y: [first, last], series, frames } = this.values;
     const isWhole = this.low === this.values.x[0] && this.high === this.values.x[1];
@@ -215,6 +225,7 @@ class ChartView {
     return this.scale(first < 0 ? Math.min(...inside) - room : first, Math.min(last, Math.max(...inside) + room));
   }
 
+  /** Draw the axis of values. Return the top of the view and its height in percent. */
   scale(bottom, top) {
     const [first, last] = this.values.y;
     const texts = roundNumbers(bottom, top, 5, 0).map((tick) => {
@@ -225,44 +236,46 @@ class ChartView {
     return [(100 * (last - top)) / (last - first), (100 * (top - bottom)) / (last - first)];
   }
 
+  /** Draw a line at the frame that the page shows. */
   mark(frame) {
     this.here.setAttribute("d", `M${this.share(frame)} 0V100`);
   }
 }
 
-/** Show the values at a position: words in this chart, a line in all charts along the drive. */
+/** Show the values at a position in this chart, and a line in all charts along the drive. */
 function pointAt(view, x) {
-  const views = view.values.frames ? along : [view];
+  const views = view.values.frames ? driveCharts : [view];
   for (const other of views) other.point(x);
   if (x !== null) view.tell();
 }
 
-/** Whether a part of the drive is chosen. */
+/** Return whether the reader has chosen a part of the drive. */
 function isPart() {
   return range.drive && (range.low > range.drive[0] || range.high < range.drive[1]);
 }
 
-/** Choose a part of the drive, unless it has no frame. */
+/** Show a part of the drive in all charts, unless it has no frame. */
 function zoom(low, high) {
   const least = 3;
   if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
   if (range.frames && !range.frames.some((frame) => frame >= low && frame <= high)) return;
   [range.low, range.high] = [Math.max(low, range.drive[0]), Math.min(high, range.drive[1])];
-  for (const view of along) view.show(range.low, range.high);
+  for (const view of driveCharts) view.show(range.low, range.high);
   for (const listener of range.onChange) listener();
 }
 
+/** Make all charts of the page interactive. */
 function startCharts(onFrame) {
   for (const element of document.querySelectorAll(".chart")) {
     const view = new ChartView(element, onFrame);
     if (!view.values.frames) continue;
-    along.push(view);
+    driveCharts.push(view);
     range.drive ??= view.values.x;
     [range.low, range.high] = range.drive;
   }
-  if (!along.length) return;
+  if (!driveCharts.length) return;
   const fit = () => {
-    for (const view of along) view.show(view.low, view.high);
+    for (const view of driveCharts) view.show(view.low, view.high);
   };
   addEventListener("resize", fit);
   fit();

@@ -1,8 +1,8 @@
-// The choices on a page: its focus, the variant beside it, the part of the drive. The address keeps them.
+// The reader chooses the focus, the variant beside it, and a part of the drive. The address keeps these choices.
 
 const choice = { focus: "", beside: "" };
 
-/** Whether a part of this name is shown: parts that belong to no variant always are. */
+/** Return whether a part of the page is shown. A part that belongs to no variant is always shown. */
 function isShown(name) {
   const form = document.querySelector(".choice");
   if (!choice.beside || !form || !name) return true;
@@ -11,20 +11,21 @@ function isShown(name) {
   return !variant || variant === choice.focus || variant === choice.beside;
 }
 
-/** What the address names: a frame or a section, and the choices behind it. */
+/** Return what the address names: a frame or a section, and then the choices. */
 function readAddress() {
   const [place, ...pairs] = location.hash.slice(1).split("&");
   const frame = /^frame-(\d+)$/.exec(place);
   return { place, frame: frame ? Number(frame[1]) : null, ...Object.fromEntries(new URLSearchParams(pairs.join("&"))) };
 }
 
-/** Name a frame and the choices in the address, as a new step of the history or in place of the last. */
+/** Write a frame and the choices into the address. The history gets a new step, or its last step is replaced. */
 function writeAddress(frame, choices, step = "replaceState") {
   const pairs = Object.entries(choices).filter(([, value]) => value).map(([name, value]) => `&${name}=${encodeURIComponent(value)}`);
   const hash = `#frame-${frame}${pairs.join("")}`;
   if (location.hash !== hash) history[step](null, "", hash);
 }
 
+/** Set the focus, and call a function after each change of the form. */
 function startChoice(focus, onChange) {
   const form = document.querySelector(".choice");
   choice.focus = focus;
@@ -34,7 +35,7 @@ function startChoice(focus, onChange) {
   form.addEventListener("change", () => choose(form.elements.focus.value, form.elements.beside.value, onChange));
 }
 
-/** Show a focus, with all variants, or with one or none beside it. */
+/** Show a focus, and beside it all variants, one variant, or none. */
 function choose(focus, beside, onChange) {
   const form = document.querySelector(".choice");
   [choice.focus, choice.beside] = [focus, beside];

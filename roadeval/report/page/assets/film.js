@@ -1,6 +1,6 @@
-// The video of a drive: each picture holds the camera, the truth and the masks of one frame.
+// The video of a drive. Each of its pictures holds the camera image, the truth and the masks of one frame.
 
-const DARKEN = 0.75; // The share of the camera's brightness below an overlay, as in other pictures.
+const DARKEN = 0.75; // An overlay leaves this share of the camera's brightness, as in other pictures.
 const [TN, TP, FP, FN, IGNORED] = [0, 1, 2, 3, 4];
 
 class Film {
@@ -8,7 +8,7 @@ class Film {
     Object.assign(this, facts);
     this.colours = colours;
     this.places = new Map(facts.frames.map((frame, place) => [frame, place]));
-    this.levels = {}; // A variant's threshold in levels of its probability, if it was moved.
+    this.levels = {}; // If the reader moved a variant's threshold, it is here in levels of the probability.
     const height = Math.ceil(facts.panels.length / facts.columns) * facts.height;
     const canvas = make("canvas", { width: facts.columns * facts.width, height });
     this.mosaic = canvas.getContext("2d", { willReadFrequently: true });
@@ -18,42 +18,43 @@ class Film {
     this.onFrame = onFrame;
   }
 
-  /** The names of the pictures that can be painted. */
+  /** Return the names of the pictures that can be painted. */
   pictures() {
     const scored = this.panels.includes("truth");
     return this.panels.flatMap((name) => (scored && name.endsWith(": mask") ? [name.replace(": mask", ": errors"), name] : [name]));
   }
 
-  /** Go to a frame's picture; of several requests only the last one is served. */
+  /** Go to a frame's picture. If several requests wait, only the last one is served. */
   seek(frame) {
     const place = this.places.get(frame);
     if (place === undefined) return;
-    this.wanted = place;
+    this.target = place;
     if (!this.video.seeking && this.video.readyState >= 2) this.video.currentTime = (place + 0.5) / this.fps;
   }
 
+  /** Take the picture that the video has reached, or go on to the requested one. */
   seeked() {
     if (this.playing) return;
-    const time = ((this.wanted ?? 0) + 0.5) / this.fps;
+    const time = ((this.target ?? 0) + 0.5) / this.fps;
     if (Math.abs(this.video.currentTime - time) > 0.4 / this.fps) this.video.currentTime = time;
     else this.take();
   }
 
-  /** Take the video's picture of now. */
+  /** Take the current picture of the video. */
   take() {
     this.mosaic.drawImage(this.video, 0, 0);
     this.cache = new Map();
-    this.onFrame(this.frames[this.wanted]);
+    this.onFrame(this.frames[this.target]);
   }
 
-  /** Play until the end, or until a frame. */
+  /** Play until a frame, or until the end. */
   async play(last, onEnd) {
     this.playing = true;
-    await this.video.play().catch(() => {}); // It was paused before it began.
+    await this.video.play().catch(() => {}); // A pause before the video begins is no error.
     const step = () => {
       const place = Math.min(Math.floor(this.video.currentTime * this.fps), this.frames.length - 1);
-      if (place !== this.wanted) {
-        this.wanted = place;
+      if (place !== this.target) {
+        this.target = place;
         this.take();
       }
       if (!this.video.paused && !this.video.ended && this.frames[place] < last) requestAnimationFrame(step);
@@ -70,7 +71,7 @@ class Film {
     this.playing = false;
   }
 
-  /** The pixels of a panel, (H, W) RGBA. */
+  /** Return the pixels of a panel, (H, W) RGBA. */
   panel(name) {
     if (!this.cache.has(name)) {
       const place = this.panels.indexOf(name);
@@ -80,14 +81,16 @@ class Film {
     return this.cache.get(name);
   }
 
-  /** Whether a pixel is road in a variant's mask, or by its threshold, if that was moved. */
+  /** Return a panel of a variant, and the level from which its pixels are road.
+   *
+   * The panel is the mask, or the probability of road if the reader moved the threshold. */
   road(variant) {
     const level = this.levels[variant];
     const moved = level !== undefined && this.panels.includes(`${variant}: probability`);
     return [this.panel(`${variant}: ${moved ? "probability" : "mask"}`), moved ? level : 128];
   }
 
-  /** Paint a picture on a canvas: the camera, or classes of pixels over the darkened camera. */
+  /** Paint a picture on a canvas: the camera image, or classes of pixels over the darkened camera image. */
   paint(canvas, name) {
     if (!this.cache) return;
     const [camera, [variant, kind]] = [this.panel("camera"), name.split(/: (?=\w+$)/)];

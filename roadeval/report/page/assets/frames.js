@@ -1,4 +1,4 @@
-// The browser of frames: a film of the drive, what is known of a frame, and a table of all frames.
+// The browser of frames shows a film of the drive, facts about one frame, and a table of all frames.
 
 class Browser {
   constructor(element) {
@@ -6,9 +6,9 @@ class Browser {
     this.data = JSON.parse(element.dataset.drive);
     this.strips = element.querySelector(".strips");
     this.rows = [...element.querySelectorAll(".frames tbody tr")];
-    this.byFrame = new Map(this.rows.map((row) => [Number(row.dataset.frame), row]));
-    this.held = new Map([...this.strips.children].map((strip) => [Number(strip.dataset.frame), strip]));
-    this.place = new Map(this.data.frames.map((frame, place) => [frame, place]));
+    this.rowByFrame = new Map(this.rows.map((row) => [Number(row.dataset.frame), row]));
+    this.stripByFrame = new Map([...this.strips.children].map((strip) => [Number(strip.dataset.frame), strip]));
+    this.placeByFrame = new Map(this.data.frames.map((frame, place) => [frame, place]));
     this.about = element.querySelector(".about");
     this.ratesTable = document.querySelector("table[data-name=rates]");
     this.verdict = document.querySelector(".verdict");
@@ -21,7 +21,7 @@ class Browser {
       });
       this.stage = new Stage(element.querySelector(".stage"), this.film);
       element.classList.add("filmed");
-      // A browser that cannot play it shows the pictures of the worst frames.
+      // If the web browser cannot play the film, the page shows the pictures of the worst frames.
       this.film.video.addEventListener("error", () => {
         element.classList.remove("filmed");
         for (const part of [this.stage.element, this.playButton]) part.hidden = true;
@@ -40,13 +40,13 @@ class Browser {
     for (const image of this.strips.querySelectorAll("img")) image.addEventListener("click", () => enlargePicture(image));
     range.frames = this.data.frames;
     range.onChange.push(() => this.narrow());
-    for (const strip of this.held.values()) strip.hidden = true;
+    for (const strip of this.stripByFrame.values()) strip.hidden = true;
     startChoice(this.data.focus, () => this.chosen());
     this.follow(Boolean(location.hash));
     addEventListener("popstate", () => this.follow(true));
   }
 
-  /** Show what the address names: a frame, the focus, a part of the drive, a threshold. */
+  /** Show what the address names: a frame, the focus, a part of the drive and a threshold. */
   follow(scroll) {
     const { place, frame, focus, beside, range: part, threshold } = readAddress();
     if (place && frame === null && this.frame !== undefined) return;
@@ -56,9 +56,10 @@ class Browser {
     if (range.drive) zoom(...(ends ? ends.slice(1).map(Number) : range.drive));
     this.setLevel(threshold ? Math.min(Math.max(Math.round(threshold) || 1, 1), 255) : undefined);
     const worst = this.data.worst[choice.focus]?.[0] ?? Number(this.element.dataset.first);
-    this.show(this.place.has(frame) ? frame : worst, { scroll: scroll && frame !== null, address: null });
+    this.show(this.placeByFrame.has(frame) ? frame : worst, { scroll: scroll && frame !== null, address: null });
   }
 
+  /** Make the buttons and keys step through the frames and play the film. */
   tools() {
     const tools = this.element.querySelector(".tools");
     const names = [".where", ".previous", ".next", ".play"];
@@ -78,20 +79,21 @@ class Browser {
     });
   }
 
-  /** The frames to step through: those of the film, without one those with pictures; within the chosen part. */
+  /** Return the frames to step through, within the chosen part: the frames of the film, or else the frames with pictures. */
   shown() {
-    const all = this.film ? this.film.frames : [...this.held.keys()].sort((a, b) => a - b);
+    const all = this.film ? this.film.frames : [...this.stripByFrame.keys()].sort((a, b) => a - b);
     const inside = all.filter(isInRange);
     return inside.length ? inside : all;
   }
 
+  /** Show the next frame, or the frame before. */
   step(by) {
     const frames = this.shown();
     const next = by > 0 ? frames.find((number) => number > this.frame) : frames.findLast((number) => number < this.frame);
     if (next !== undefined) this.show(next, { follow: true, address: "replaceState" });
   }
 
-  /** Play from this frame, from the first one if this is the last; or stop. */
+  /** Stop the film, or play it from this frame. After the last frame it begins again. */
   toggle() {
     const [frames, button] = [this.shown(), this.playButton];
     if (this.film.playing) return this.film.pause();
@@ -103,22 +105,23 @@ class Browser {
     });
   }
 
-  /** Show a frame; the address names it, as a new step of the history or in place of the last step. */
+  /** Show a frame. `address` names the method of the history that writes it into the address. */
   show(frame, { scroll = false, follow = false, address = "pushState" } = {}) {
     this.frame = frame;
     if (address) this.writeAddress(address);
-    const row = this.byFrame.get(frame);
+    const row = this.rowByFrame.get(frame);
     for (const other of this.rows) other.removeAttribute("aria-current");
     row?.setAttribute("aria-current", "true");
     if (follow && row) reveal(row);
-    for (const view of along) view.mark(frame);
-    for (const strip of this.held.values()) strip.hidden = Number(strip.dataset.frame) !== frame;
+    for (const view of driveCharts) view.mark(frame);
+    for (const strip of this.stripByFrame.values()) strip.hidden = Number(strip.dataset.frame) !== frame;
     this.position();
     this.tell(row);
     if (this.film && !this.film.playing) this.film.seek(frame);
     if (scroll) this.element.querySelector(".viewer").scrollIntoView({ block: "start" });
   }
 
+  /** Write the frame and the choices into the address. */
   writeAddress(step = "replaceState") {
     const level = this.film?.levels[choice.focus];
     const part = isPart() ? `${Math.ceil(range.low)}-${Math.floor(range.high)}` : "";
@@ -126,6 +129,7 @@ class Browser {
     writeAddress(this.frame, { focus, beside: choice.beside, range: part, threshold: level }, step);
   }
 
+  /** Show the number of the frame, and enable the buttons that lead to others. */
   position() {
     const frames = this.shown();
     const place = frames.indexOf(this.frame);
@@ -136,11 +140,12 @@ class Browser {
     this.next.disabled = !frames.some((number) => number > this.frame);
   }
 
+  /** Return the counts of a variant on a frame; undefined if it was not scored. */
   countsOf(variant, frame) {
-    return this.data.counts[variant]?.[this.place.get(frame)];
+    return this.data.counts[variant]?.[this.placeByFrame.get(frame)];
   }
 
-  /** Tell the rates of this frame, its conditions, and what opens it. */
+  /** Show the rates of this frame, its conditions, and the command that opens it. */
   tell(row) {
     const [table, names] = [this.about.querySelector("table"), Object.keys(this.data.counts)];
     const scored = names.filter((name) => this.countsOf(name, this.frame) && isShown(name));
@@ -157,34 +162,35 @@ class Browser {
     table.tBodies[0].replaceChildren(
       ...scored.map((name) => cells("td", [name, ...rates.map((rate) => percent(RATES[rate](this.countsOf(name, this.frame))))])),
     );
-    const sentences = this.held.get(this.frame)?.querySelectorAll(".two .note") ?? [];
+    const sentences = this.stripByFrame.get(this.frame)?.querySelectorAll(".two .note") ?? [];
     this.about.querySelector(".words").textContent = [...sentences].map((p) => p.textContent.replace(/\.?$/, ".")).join(" ") || (row?.dataset.note ?? "");
     const command = this.about.querySelector(".open code");
     if (command) command.textContent = this.element.dataset.command.replace("{}", this.frame);
   }
 
-  /** Show a change of the focus, or of the variant beside it, all over the page. */
+  /** Show the chosen focus and the variant beside it in all parts of the page. */
   chosen(isNew = true) {
     const others = this.data.variants.filter((name) => name !== choice.focus && name !== "blind");
     for (const part of document.querySelectorAll("[data-focus]")) part.hidden = part.dataset.focus !== choice.focus;
     this.stage?.prefer([choice.focus, choice.beside || others[0]]);
-    for (const view of along) view.show(view.low, view.high);
+    for (const view of driveCharts) view.show(view.low, view.high);
     this.filter();
     this.judge();
     this.setLevel(this.film?.levels[choice.focus]);
     const worst = this.data.worst[choice.focus] ?? [];
-    const places = this.about.querySelector(".worst");
-    places.replaceChildren(worst.length ? `Worst frames of ${choice.focus}: ` : "", ...worst.map((frame) => this.frameButton(frame)));
+    const links = this.about.querySelector(".worst");
+    links.replaceChildren(worst.length ? `Worst frames of ${choice.focus}: ` : "", ...worst.map((frame) => this.frameButton(frame)));
     if (isNew && worst.length) this.show(worst[0], { address: "replaceState" });
   }
 
+  /** Return a button that shows a frame. */
   frameButton(frame) {
     const button = make("button", { type: "button", textContent: frame });
     button.addEventListener("click", () => this.show(frame, { follow: true }));
     return button;
   }
 
-  /** Show a part of the drive: its frames, rates and verdict. */
+  /** Show the frames, the rates and the verdict of the chosen part of the drive. */
   narrow() {
     this.filter();
     this.judge();
@@ -194,17 +200,18 @@ class Browser {
     this.writeAddress();
   }
 
+  /** Return the error rate of the focus on a frame. */
   errorOf(frame) {
     return RATES.ERR(this.countsOf(choice.focus, frame));
   }
 
-  /** The frame with the highest error rate of the focus; undefined if none was scored. */
+  /** Return the frame with the highest error rate of the focus; undefined if no frame was scored. */
   worstOf(frames) {
     const scored = frames.filter((frame) => this.countsOf(choice.focus, frame));
     return scored.reduce((worst, frame) => (this.errorOf(frame) > this.errorOf(worst) ? frame : worst), scored[0]);
   }
 
-  /** Say how wrong the focus is, on the whole drive or on the chosen part of it. */
+  /** Show the verdict on the focus, for the whole drive or for the chosen part. */
   judge() {
     const { words, counts, frames, verdicts } = this.data;
     const countsIn = (name) => counts[name].filter((frame, place) => frame && isInRange(frames[place]));
@@ -213,9 +220,9 @@ class Browser {
     this.verdict.textContent = choice.focus === this.data.focus ? this.verdictOfDrive : (verdicts[choice.focus]?.replaceAll("`", "") ?? this.verdictOfDrive);
     if (isPart() && ofFocus) {
       const others = Object.keys(counts).filter((name) => name !== choice.focus && isShown(name));
-      const told = others.map((name) => fill(words["error of a range"], { variant: name, ...rates(name) })).join(" ");
-      const named = { first: inside[0], last: inside.at(-1), frames: inside.length, variant: choice.focus, others: told };
-      this.verdict.textContent = fill(words["verdict of a range"], { ...named, ...rates(choice.focus) });
+      const sentences = others.map((name) => fill(words["error of a range"], { variant: name, ...rates(name) })).join(" ");
+      const facts = { first: inside[0], last: inside.at(-1), frames: inside.length, variant: choice.focus, others: sentences };
+      this.verdict.textContent = fill(words["verdict of a range"], { ...facts, ...rates(choice.focus) });
     }
     const link = document.querySelector("#summary .links a");
     const worst = this.worstOf(inside);
@@ -228,7 +235,7 @@ class Browser {
     if (this.ratesTable) narrowRates(this.ratesTable, words["rates of a range"], isPart() ? (name) => counts[name] && countsIn(name) : null);
   }
 
-  /** A threshold on the focus' probability: the picture, the rates, and the line to write. */
+  /** Let the reader move the threshold on the probability of the focus. */
   threshold() {
     this.thresholdBox = this.about.querySelector(".threshold");
     if (!this.thresholdBox) return;
@@ -241,6 +248,7 @@ class Browser {
     button.addEventListener("click", () => set(undefined));
   }
 
+  /** Show the picture, the rates and the line of a configuration for a threshold; undefined restores the threshold of the run. */
   setLevel(level) {
     const slider = this.data.thresholds[choice.focus];
     if (!this.thresholdBox) return;
@@ -250,7 +258,7 @@ class Browser {
       this.film.levels[choice.focus] = level;
       this.stage.draw();
     }
-    // A level holds 256 of the 65536 codes of a probability; road are the pixels above a code.
+    // A level holds 256 of the 65536 codes of a probability. Pixels above a code are road.
     const code = level === undefined ? Math.round(slider.now * 65535) : 256 * level - 1;
     const shown = Math.round((code + 1) / 256);
     const [above, below] = [(counts) => counts.slice(shown), (counts) => counts.slice(0, shown)].map((part) => (counts) => part(counts).reduce((sum, count) => sum + count, 0));
@@ -267,6 +275,7 @@ class Browser {
     line.textContent = slider.line.replace("{}", threshold);
   }
 
+  /** Make the form filter the table of frames. */
   filters() {
     const form = this.element.querySelector(".filters");
     this.form = form;
@@ -279,6 +288,7 @@ class Browser {
     form.addEventListener("reset", () => setTimeout(clear));
   }
 
+  /** Show the rows of the table that fit the form and lie in the chosen part. */
   filter() {
     const limits = Object.fromEntries(new FormData(this.form));
     const [least, most] = [limits.least, limits.most].map((text) => (text ? Number(text) : NaN));
@@ -298,7 +308,7 @@ class Browser {
     if (this.frame !== undefined) this.position();
   }
 
-  /** Show only the chosen variants' columns. */
+  /** Show only the columns of the chosen variants. */
   hideColumns() {
     for (const [place, title] of this.columns.entries()) {
       title.hidden = !isShown(title.dataset.variant);
@@ -310,11 +320,12 @@ class Browser {
   }
 }
 
+/** Return whether a frame lies in the chosen part of the drive. */
 function isInRange(frame) {
   return !range.drive || (frame >= range.low && frame <= range.high);
 }
 
-/** Put the rates of some frames into the table of the whole drive, or the drive's own again. */
+/** Put the rates of some frames into the table of the drive. Without `countsOf` the rates of the whole drive return. */
 function narrowRates(table, words, countsOf) {
   table.caption.dataset.drive ??= table.caption.textContent;
   table.caption.textContent = countsOf ? words : table.caption.dataset.drive;
@@ -332,11 +343,12 @@ function narrowRates(table, words, countsOf) {
   }
 }
 
+/** Return whether a frame has a condition, or pictures. */
 function hasCondition(row, condition) {
   return !condition || row.classList.contains(condition) || (row.dataset.conditions ?? "").split(" ").includes(condition);
 }
 
-/** Scroll a row into sight within its table, and leave the page where it is. */
+/** Scroll a table until a row of it is visible; the page does not move. */
 function reveal(row) {
   const box = row.closest(".scroll");
   const head = row.closest("table").tHead.offsetHeight;

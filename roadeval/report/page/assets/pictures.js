@@ -1,9 +1,9 @@
-// Pictures that enlarge, and a slider between two of them.
+// A click enlarges a picture. A slider compares two pictures of the film.
 
 const dialog = document.querySelector("dialog.large");
 let onClosed = null;
 
-/** Show something over the page until it is closed. */
+/** Show elements over the page until the reader closes them. */
 function enlarge(content, closed = null) {
   const inside = make("div", { className: "inside" });
   const button = make("button", { type: "button", className: "closing", textContent: "Close" });
@@ -22,11 +22,12 @@ dialog.addEventListener("click", (event) => {
   if (event.target === dialog) dialog.close();
 });
 
+/** Show a picture over the page, with its title. */
 function enlargePicture({ src, alt }) {
   enlarge([make("img", { src, alt }), make("p", { className: "note", textContent: alt })]);
 }
 
-/** Two pictures of the film over each other: one to the left of the slider, one to the right. */
+/** Two pictures of the film that cover each other: one shows to the left of the slider, one to the right. */
 class Stage {
   constructor(element, film) {
     this.element = element;
@@ -63,7 +64,7 @@ class Stage {
     });
   }
 
-  /** Look at two variants; at the camera in place of one that has no masks. */
+  /** Show two variants. The camera replaces a variant that has no masks. */
   prefer(variants) {
     const names = this.film.pictures();
     for (const [side, variant] of variants.entries()) {
@@ -72,6 +73,7 @@ class Stage {
     this.draw();
   }
 
+  /** Paint both pictures. */
   draw() {
     for (const [side, view] of [this.above, this.below].entries()) {
       const name = this.selects[side].value;
@@ -81,6 +83,7 @@ class Stage {
     this.slide();
   }
 
+  /** Show a share of the left picture, in percent. */
   slide(share = Number(this.slider.value)) {
     const percent = Math.min(100, Math.max(0, share));
     this.slider.value = percent;
@@ -89,6 +92,7 @@ class Stage {
     this.edge.hidden = percent <= 0 || percent >= 100;
   }
 
+  /** Enlarge the pictures, or close the enlarged pictures. */
   toggle() {
     if (dialog.open) dialog.close();
     else enlarge([this.element], () => this.home.insertBefore(this.element, this.next));

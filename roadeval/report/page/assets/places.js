@@ -1,19 +1,20 @@
-// Values in rows of marks, under the pointer and by the arrow keys.
+// The pointer and the arrow keys show the values of a row of marks.
 
+/** Return a hidden box for values, inside an element. */
 function makeTip(element) {
   const tip = make("div", { className: "tip", hidden: true });
   element.append(tip);
   return tip;
 }
 
-/** Put a tip beside a point of its element, on the side that has room. */
+/** Place a box beside a point of its element, on the side that has room. */
 function place(tip, element, x, y) {
   const left = x + (x > element.clientWidth * 0.6 ? -tip.offsetWidth - 12 : 12);
   tip.style.left = `${Math.max(0, Math.min(left, element.clientWidth - tip.offsetWidth))}px`;
   tip.style.top = `${y}px`;
 }
 
-/** Rows of marks: the numbers of one row are shown. */
+/** A chart of rows of marks. It shows the values of one row at a time. */
 class RowsView {
   constructor(element) {
     this.element = element;
@@ -28,6 +29,7 @@ class RowsView {
     element.addEventListener("keydown", (event) => this.key(event));
   }
 
+  /** Move to the row above or below. */
   key(event) {
     const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
     if (!step) return;
@@ -38,6 +40,7 @@ class RowsView {
     event.stopPropagation();
   }
 
+  /** Show the values of a row; null hides them. */
   point(number) {
     this.rows[this.pointed]?.classList.remove("pointed");
     this.pointed = number;

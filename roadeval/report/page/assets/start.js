@@ -1,6 +1,6 @@
-// The page is complete without a script; this makes it interactive.
+// These scripts make the page interactive. It is complete without them.
 
-/** Give each command a button that copies it, if the browser allows it. */
+/** Give each command a button that copies it, if the browser allows that. */
 function makeCommands() {
   if (!navigator.clipboard) return;
   for (const command of document.querySelectorAll(".command")) {
@@ -14,7 +14,7 @@ function makeCommands() {
   }
 }
 
-/** Open the contents beside the page, and close them if they are above it. */
+/** Open the list of contents if it stands beside the page, and close it if it stands above. */
 function fitOutline() {
   const wide = matchMedia("(min-width: 1100px)");
   const fit = () => (document.querySelector(".outline details").open = wide.matches);
@@ -40,7 +40,7 @@ function followOutline() {
 
 document.documentElement.classList.add("scripted-on");
 for (const table of document.querySelectorAll("table")) makeSortable(table);
-for (const long of document.querySelectorAll(".long")) makeSearchable(long);
+for (const part of document.querySelectorAll(".long")) makeSearchable(part);
 makeCommands();
 const element = document.querySelector(".browser");
 let browser = null;
@@ -50,7 +50,7 @@ if (element) browser = new Browser(element);
 fitOutline();
 followOutline();
 
-/** The frame of the table that is nearest to a number. */
+/** Return the shown frame that is nearest to a number. */
 function nearestFrame(frame) {
   const frames = browser.shown();
   return frames[nearest(frames, frame)] ?? frame;
@@ -59,5 +59,5 @@ function nearestFrame(frame) {
 for (const image of document.querySelectorAll(".grid img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }
-// A closed chart had no width to fit its numbers into.
-for (const more of document.querySelectorAll("details")) more.addEventListener("toggle", () => dispatchEvent(new Event("resize")));
+// A closed chart has no width, so its numbers are fitted when it opens.
+for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", () => dispatchEvent(new Event("resize")));

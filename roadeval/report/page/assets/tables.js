@@ -1,25 +1,27 @@
-// Tables that sort by a click on a column's title, and fields that search long tables.
+// A click on the title of a column sorts its table. A field searches a long table.
 
-/** A new element with its properties. */
+/** Return a new element with its properties. */
 const make = (tag, properties) => Object.assign(document.createElement(tag), properties);
 
-const MOST_ROWS = 3; // Fewer rows need no sorting.
+const LEAST_ROWS = 3; // A table with fewer rows needs no sorting.
 
-/** The number at the beginning of a cell's text, as people write it; NaN without one. */
+/** Return the number at the beginning of a cell's text, or NaN if there is none. */
 function numberOf(text) {
   const plain = text.trim().replaceAll(",", "").replaceAll("\u2212", "-");
   return /^[-+]?[\d.]/.test(plain) ? parseFloat(plain) : NaN;
 }
 
+/** Compare two texts: by their numbers if both begin with one, else by their letters. */
 function compare(a, b) {
   const [x, y] = [numberOf(a), numberOf(b)];
   if (!Number.isNaN(x) && !Number.isNaN(y)) return x - y;
   return a.localeCompare(b, undefined, { numeric: true });
 }
 
-/** Whether a cell is empty; such rows are last in both directions. */
+/** Return whether a cell is empty. Rows with an empty cell come last in both directions. */
 const isEmpty = (text) => ["", "\u2013", "none given"].includes(text.trim());
 
+/** Sort the rows of a table by a column. Rows with totals stay at the end. */
 function sort(table, column, descending) {
   const body = table.tBodies[0];
   const text = (row) => row.cells[column].textContent;
@@ -30,8 +32,9 @@ function sort(table, column, descending) {
   table.classList.add("sorted");
 }
 
+/** Make the titles of a table buttons that sort it. */
 function makeSortable(table) {
-  if (table.tBodies[0].rows.length < MOST_ROWS) return;
+  if (table.tBodies[0].rows.length < LEAST_ROWS) return;
   const titles = [...table.tHead.rows[table.tHead.rows.length - 1].cells];
   for (const [column, title] of titles.entries()) {
     if (!title.textContent.trim()) continue;
@@ -39,7 +42,7 @@ function makeSortable(table) {
     button.append(...title.childNodes);
     title.append(button);
     button.addEventListener("click", () => {
-      // Words from a to z at first, numbers from the highest.
+      // The first click sorts words from a to z, and numbers from the highest.
       const first = title.classList.contains("t") || column === 0 ? "ascending" : "descending";
       const other = first === "ascending" ? "descending" : "ascending";
       const order = title.getAttribute("aria-sort") === first ? other : first;
@@ -50,10 +53,11 @@ function makeSortable(table) {
   }
 }
 
-function makeSearchable(long) {
-  const [field, count] = [long.querySelector("input"), long.querySelector("output")];
-  const rows = [...long.querySelector("tbody").rows];
-  long.querySelector(".find").hidden = false;
+/** Show only the rows that contain all words of the field. */
+function makeSearchable(part) {
+  const [field, count] = [part.querySelector("input"), part.querySelector("output")];
+  const rows = [...part.querySelector("tbody").rows];
+  part.querySelector(".find").hidden = false;
   field.addEventListener("input", () => {
     const words = field.value.trim().toLowerCase().split(/\s+/);
     for (const row of rows) {
