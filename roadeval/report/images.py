@@ -98,7 +98,12 @@ def example_grid(examples: Sequence[ExampleFrame], caption: str = "") -> ImageGr
 
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
-    return ImageFile(encode_jpeg(shrink(paint(layer), width)))
+    return ImageFile(encode_jpeg(painted(layer, width).image))
+
+
+def painted(layer: LayerImage, width: int = WIDTH) -> LayerImage:
+    """Return a picture of the layer of at most ``width`` pixels across, to save memory."""
+    return LayerImage(layer.title, shrink(paint(layer), width))
 
 
 def encode_jpeg(image: Rgb, *, finest: bool = False) -> bytes:

@@ -21,8 +21,8 @@ from roadeval.jobs.results.result import DriveResult
 from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip
 from roadeval.report.findings import NotableFrame
-from roadeval.report.images import ExampleFrame, LayerImage, fade
-from roadeval.report.sections.frames import SMALL, strip
+from roadeval.report.images import ExampleFrame, LayerImage, fade, painted
+from roadeval.report.sections.frames import SMALL, reduced, strip
 from roadeval.results.facts import focus_of
 from roadeval.results.sentences import notes
 
@@ -96,7 +96,7 @@ class FramePicker:
         if self._recording:
             focus = self._result.focus or focus_of(v.name for v in self._recording.variants) or ""
             for n in numbers:
-                yield replace(self.outcome(self._recording, focus, n), title=f"frame {n}")
+                yield replace(painted(self.outcome(self._recording, focus, n)), title=f"frame {n}")
 
     def outcome(self, recording: Recording, variant: str, frame: int) -> LayerImage:
         """Return the errors of a variant on a frame, or without truth its mask."""
@@ -116,11 +116,12 @@ class FramePicker:
             unlabelled = self._result.facts.unlabelled
             look_at = unlabelled.look_at if unlabelled else []
             pictured = [frame for frame in look_at if frame in self._result.pictured]
-            return [*map(self._pictured, pictured[:WORST])]
+            return [reduced(self._pictured(frame)) for frame in pictured[:WORST]]
         focus_masks = only(self._finals, variant=self._focus)
         rows = tables.worst(focus_masks, WORST, apart_ns=scene_ns(self._result.rows["stamp_ns"]))
         rows = rows[rows[TESTED] >= focus_masks[TESTED].mean()]
-        return [self._notable(*row) for row in rows[["frame", "stamp_ns"]].itertuples(index=False)]
+        stamped = rows[["frame", "stamp_ns"]].itertuples(index=False)
+        return [reduced(self._notable(*row)) for row in stamped]
 
     def moved(self, shown: Sequence[NotableFrame], *, harmed: bool) -> list[NotableFrame]:
         """Return the frames that the filter harmed or helped most, of scenes not yet shown."""
@@ -130,7 +131,7 @@ class FramePicker:
             pairs, MOVED, harmed=harmed, apart_ns=apart, besides=besides
         )
         columns = rows[["frame", "stamp_ns", "change"]].assign(variant=FILTERED)
-        return [self._notable(*row) for row in columns.itertuples(index=False)]
+        return [reduced(self._notable(*row)) for row in columns.itertuples(index=False)]
 
     def strip(self, frame: int, layers: int = SMALL) -> Strip:
         """Return a frame with its pictures; pictures of layers are at most so many pixels wide."""

@@ -28,7 +28,7 @@ from roadeval.report.captions import caption, captions, note
 from roadeval.report.chart import Chart
 from roadeval.report.film import Film
 from roadeval.report.findings import Findings, NotableFrame
-from roadeval.report.images import LayerImage, jpeg
+from roadeval.report.images import LayerImage, jpeg, painted
 from roadeval.report.tables import variant_cell
 
 LARGE: Final = 420
@@ -72,6 +72,13 @@ def _frames(
     """Yield frames below a heading; no page break separates it from the first frame."""
     for place, frame in enumerate(frames):
         yield KeepTogether([*(head if place == 0 else ()), *notable_frame(findings, frame)])
+
+
+def reduced(frame: NotableFrame) -> NotableFrame:
+    """Return a frame whose pictures have the size that they have on paper, to save memory."""
+    width = SMALL if frame.rates else LARGE  # a mask is large where it is what there is to look at
+    layers = [[painted(image, width) for image in row] for row in frame.layers]
+    return replace(frame, images=[painted(image, LARGE) for image in frame.images], layers=layers)
 
 
 def notable_frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
