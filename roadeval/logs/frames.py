@@ -227,12 +227,13 @@ def settle(
         if label_topic is not None:
             is_truth, reader = name == TRUTH, readers[label_topic.name]
             pairing = by_time(reader, camera, settings.sync_offset_ms if is_truth else 0.0)
-            check_size(label_topic.size, reader, 0, camera, pairing)
+            notes = check_size(label_topic.size, reader, 0, camera, pairing)
             values = MaskSettings(labels=config.labels if is_truth else LabelSettings())
             shown = "shadow" if name == SHADOW else "road"
             names = class_names(reader.name, topics, readers) if is_truth else {}
             meaning = meaning_of(reader, values, shown=shown, names=names)
-            labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
+            source = LabelSource(reader.name, reader, meaning, pairing, reason)
+            labels[name] = replace(source, notes=notes)
     calibration = calibration_of(image, topics, readers)
     if any(calibration) and image.turned != 1 and camera.images.limits.turn:
         reason = "it is of the sensor's rows, and the images are turned ({frames.unturned})"

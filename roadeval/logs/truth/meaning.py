@@ -572,16 +572,30 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
             "or leave these as they are stored with {frames.unturned}",
             sizes,
         )
+    if is_stretched(theirs, ours):
+        return Sentence(
+            "{}, another shape: fill labels of a part of the image up to its size, or stretch "
+            "labels of the whole image with {topics.resize_truth}",
+            sizes,
+        )
     return Sentence("{}: scale the labels with {topics.resize_truth}", sizes)
+
+
+def is_stretched(theirs: Size, ours: Size) -> bool:
+    """Return whether scaling changes a label's shape, by more than sizes are rounded."""
+    return abs(theirs[0] * ours[1] - theirs[1] * ours[0]) > max(theirs + ours)
 
 
 def check_size(
     size: Size | None, labels: LabelPictures, position: int, camera: Camera, pairing: Pairing
-) -> None:
-    """Raise a `LogError` if a label has another size than its image, and labels are not scaled."""
+) -> tuple[str, ...]:
+    """Return a warning if scaling changes a label's shape.
+
+    A `LogError` if a label has another size than its image, and labels are not scaled.
+    """
     expected = camera.topic.size
     if size is None or expected is None or size == expected:
-        return
+        return ()
     image = next(frames_of(pairing, position, position + 1), None)
     if image is not None:
         with suppress(BadMessage, FrameError):
@@ -589,6 +603,9 @@ def check_size(
     sizes = labels.place(position), size, f"but {camera.topic.name} is", expected
     if problem := size_problem(*sizes, resize=camera.resize_labels):
         raise LogError(problem)
+    stretch = "labels of {}x{} are stretched to {}x{}, another shape".format(*size, *expected)
+    warning = f"{stretch}: if they show a part of the image, they do not fit it"
+    return (warning,) if is_stretched(size, expected) else ()
 
 
 def undecodable(pictures: LabelPictures, problem: str) -> LogError:
@@ -617,12 +634,13 @@ def meaning_of(
     stated = settings.labels.with_values(labels.name, names, origin.classes)
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []
-    problem = ""
+    problem, notes = "", tuple[str, ...]()
     for position, picture in samples(labels):
         file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
         try:
             if camera and pairing:
-                check_size(size_of(picture, labels.limits), labels, position, camera, pairing)
+                size = size_of(picture, labels.limits)
+                notes = check_size(size, labels, position, camera, pairing) or notes
             if confidence is None:
                 values = count_values(picture, stated, labels.name, labels.limits, file)
             else:
@@ -633,11 +651,12 @@ def meaning_of(
     if not counts:
         raise undecodable(labels, problem)
     if confidence is not None:
-        return confidence
+        return replace(confidence, notes=notes)
     if origin.occurring:
         meaning = find_class_meaning(stated, origin, labels.name)
     else:
         meaning = find_meaning(stated, counts, labels.name, shown)
+    meaning = replace(meaning, notes=(*meaning.notes, *notes))
     pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()
     for value, count in pixels.items():
@@ -657,4 +676,4 @@ def meaning_of(
         f"{100 * road / labelled:.2f}",
         shares,
     )
-    return replace(meaning, notes=(doubt,))
+    return replace(meaning, notes=(*meaning.notes, doubt))
