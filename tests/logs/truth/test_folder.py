@@ -74,6 +74,54 @@ def test_names_that_are_times_are_stamps(tmp_path):
     )
 
 
+SECOND = 1_700_000_000
+
+
+@pytest.mark.parametrize("name", ["cam_{}_road", "frame{}", "{}_pred_v2", "cam0-{}.rectified"])
+def test_the_text_around_the_times_is_the_same_in_all_names(tmp_path, name):
+    times = (f"{SECOND + second}.5" for second in range(2))
+    path = folder(tmp_path, *(f"{name.format(time)}.png" for time in times))
+    by, stamps = keys(path)
+    assert (by, [*stamps.values()]) == ("stamp", [SECOND * 10**9 + n * 10**8 for n in (5, 15)])
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("left_1700000000123", "right_1700000001123"),
+        ("drive_1700000000_000001", "drive_1700000000_000002"),
+        ("frame_0000000001", "frame_0000000002"),
+    ],
+)
+def test_a_number_is_not_taken_for_a_time(tmp_path, names):
+    with suppress(LogError):
+        assert keys(folder(tmp_path, *(f"{name}.png" for name in names)))[0] == "number"
+
+
+@pytest.mark.parametrize(
+    ("digits", "nanoseconds"),
+    [
+        (("50000000", "150000000", "0"), (50_000_000, 150_000_000, 0)),
+        (("50000000",), (50_000_000,)),
+        (("50000", "150000"), (50_000_000, 150_000_000)),
+        (("50", "950"), (50_000_000, 950_000_000)),
+        (("5", "25", "125", "0625"), (500_000_000, 250_000_000, 125_000_000, 62_500_000)),
+        (("5000", "2500"), (500_000_000, 250_000_000)),
+        (("051234567", "51234567"), (51_234_567, 512_345_670)),
+    ],
+)
+def test_zeros_before_the_digits_of_a_second_may_be_left_out(tmp_path, digits, nanoseconds):
+    names = [f"{SECOND + place}_{text}.png" for place, text in enumerate(digits)]
+    _, stamps = keys(folder(tmp_path, *names))
+    assert [stamps[name] % 10**9 for name in names] == [*nanoseconds]
+
+
+def test_digits_of_a_second_that_may_be_either_are_refused(tmp_path):
+    path = folder(tmp_path, f"{SECOND}.51234567.png", f"{SECOND}.151234567.png")
+    with pytest.raises(LogError, match=r"may be decimals, or nanoseconds .*; write nine digits"):
+        keys(path)
+
+
 def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
     path = folder(tmp_path, "c_mask.png", "a.png", "other.png")
     images = tmp_path / "images"
