@@ -81,9 +81,9 @@ def _deep_colours(data: File) -> Array | None:
 def to_labels(data: File, limits: Limits) -> Array:
     """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
-    A file with a palette gives its indices, or its greys if it has no colours. Three equal channels
-    count as one. An image of a single colour that is transparent in parts gives its opacity. Errors
-    as in `to_rgb`, and if one of several colours is transparent in parts.
+    A file with a palette gives its indices, or its greys if no entry has a colour. Three equal
+    channels count as one. An image of a single colour that is transparent in parts gives its
+    opacity. Errors as in `to_rgb`, and if one of several colours is transparent in parts.
     """
     return upright(_label_values(_decode(data, limits)), _left_to_turn(data, limits))
 
@@ -94,9 +94,9 @@ def _label_values(image: Any) -> Array:
     if image.mode == "P":
         indices = np.array(image)
         palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-        used = palette[: int(indices.max()) + 1]
-        greys = (used == used[:, :1]).all() and len(used) > 1
-        return np.ascontiguousarray(used[indices, 0]) if greys else indices
+        # Unused colours count, too: all images of a tool have one palette, and must mean the same.
+        greys = (palette == palette[:, :1]).all() and indices.max() < len(palette)
+        return np.ascontiguousarray(palette[indices, 0]) if greys else indices
     if image.mode in _SAMPLES:
         samples = _samples(image)
         return samples if samples.dtype.kind != "f" else eight_bits(samples)

@@ -172,7 +172,7 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
 def to_labels(picture: Picture, limits: Limits) -> Array:
     """Decode a label picture to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
-    An image with a palette gives its indices, or its greys if it has no colours. Three equal
+    An image with a palette gives its indices, or its greys if no entry has a colour. Three equal
     channels count as one. A `BadMessage` as in `to_rgb`.
     """
     if isinstance(picture, RawPicture):

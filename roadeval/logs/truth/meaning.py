@@ -290,8 +290,8 @@ def find_meaning(
 ) -> ClassMap:
     """Find the meaning of the values of label pictures, which show road or ``shown``.
 
-    ``pictures`` are the values, or packed colours, of each of some pictures. A `LogError` if a
-    named value does not occur; or if none is named, and the values are class ids or have different
+    ``pictures`` are the values, or packed colours, of each of some pictures. A `LogError` if no
+    named value of road occurs; or if none is named, and the values are class ids or have different
     meanings in different pictures.
     """
     values = sorted({value for picture in pictures for value in picture})
@@ -303,16 +303,23 @@ def find_meaning(
         text = _color_name(value) if labels.road_colors else str(value)
         return f"{text} ({names[value]})" if value in names else text
 
-    there = f"{name}, whose frames hold {_listed(map(text_of, values))}"
+    there = f"{name}: the labels that were looked at hold {_listed(map(text_of, values))}"
     if labels.road or labels.road_colors:
-        # A class that has a name may be rare.
-        codes = {value: value for value in (*values, *names)}
+        ending = "_colors" if labels.road_colors else ""
+        road, other = labels.road, labels.ignore
         if labels.road_colors:
-            colors = (map(_pack_color, labels.road_colors), map(_pack_color, labels.ignore_colors))
-            meaning = _as_named(*colors, codes, there, text=text_of, ending="_colors")
-            return replace(meaning, names=names)
-        meaning = _as_named(labels.road, labels.ignore, codes, there, text=text_of)
-        meaning = replace(meaning, names=names)
+            road, other = (
+                tuple(map(_pack_color, colors))
+                for colors in (labels.road_colors, labels.ignore_colors)
+            )
+        # A class that has a name may be rare, and so may all but one of those of road.
+        codes: dict[Any, int] = {value: value for value in (*values, *names)}
+        rare = [v for v in (*road, *other) if isinstance(v, int) and v not in codes]
+        rare = rare if codes.keys() & {*road} else []
+        codes |= {value: value for value in rare}
+        meaning = _as_named(road, other, codes, there, text=text_of, ending=ending)
+        unseen = f"no label that was looked at holds {_listed(map(text_of, rare))}: is it rare?"
+        meaning = replace(meaning, names=names, notes=(unseen,) if rare else ())
         unnamed = any(value < 0 and value not in meaning.meaning for value in values)
         return replace(meaning, words=f"{meaning.words}; {NO_LABEL}") if unnamed else meaning
     for truths in _MASKS:
