@@ -306,6 +306,13 @@ def _compare_two(
         parts = pairing.common_regions(finals, *counted)
         regions.append(by_drive(parts, ["variant", "region"], groups))
     if not masks:
+        names, others = (values_of(rows, "variant") for rows in (base_rows, new_rows))
+        if not {*names} & {*others}:
+            raise ComparisonError(
+                f"{base.label} has the variants {', '.join(names)}, and {new.label} "
+                f"{', '.join(others)}",
+                remedy=f"name those to compare, as --variant {names[0]}={others[0]}",
+            )
         raise ComparisonError(
             f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
             "nothing can be compared; replay the same range into both"
