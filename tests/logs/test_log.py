@@ -18,7 +18,13 @@ from roadeval.logs.container.records import FileBytes
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.frames import LoggedFrame, Selection
 from roadeval.logs.log import Log, describe, open_log
-from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings, parse_time
+from roadeval.logs.settings import (
+    FrameSettings,
+    LabelPlace,
+    LogConfig,
+    TopicSettings,
+    parse_time,
+)
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
 from tests.fixtures.flavours import FLAVOURS, file_fields, in_json, scenes
@@ -248,6 +254,21 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
         numbers = [number for number, other in enumerate(names) if other == name]
         assert [frame.number for frame in frames] == numbers
         assert not any("several cameras" in note for note in frames[0].accounting.notes)
+
+
+@pytest.mark.parametrize(("name", "told"), [(None, 0), ("rear", 1)])
+def test_numbers_of_labels_are_told_to_count_the_images_of_all_cameras(tmp_path, name, told):
+    path = two_cameras(tmp_path / "a.mcap", ["front", "rear"] * 3)
+    (tmp_path / "labels").mkdir()
+    for number in range(3):
+        (tmp_path / "labels" / f"{number}.png").write_bytes(png(grey(255 * (number > 0))))
+    config = LogConfig(
+        truth=LabelPlace(str(tmp_path / "labels")), topics=TopicSettings(frame_id=name)
+    )
+    with open_log(path, config) as log:
+        notes = log.select().truth.notes
+    assert len(notes) == told
+    assert all("also those that `topics.frame_id` leaves out" in note for note in notes)
 
 
 def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:
