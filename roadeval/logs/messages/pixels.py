@@ -27,6 +27,9 @@ from roadeval.logs.messages.pictures import (
 
 Array = npt.NDArray[Any]
 
+ROUNDING: Final = 1e-3
+"""How far rounding, as to 16 bits, may move a fraction beyond 0 or 1."""
+
 
 @dataclass(frozen=True)
 class PixelFormat:

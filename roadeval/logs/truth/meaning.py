@@ -37,6 +37,7 @@ from roadeval.logs.files import is_shown
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
 from roadeval.logs.messages.pixels import (
+    ROUNDING,
     format_of,
     lossy_format,
     rows_of,
@@ -222,6 +223,12 @@ class Confidence:
         probability = self.codes(picture, limits)
         return Labels(self.road(probability), probability=probability)
 
+    def check(self, greatest: int, name: str) -> None:
+        """Raise a `LogError` if the greatest code of some maps tells that they are masks."""
+        if greatest in (1, TOP // 255):  # 1 of 65535, or of 255
+            problem = f"the greatest number of {name} is 1: these are masks, and no confidences"
+            raise LogError(problem, remedy="leave out the threshold, or write fractions")
+
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
 
@@ -232,9 +239,9 @@ class Confidence:
             raise BadMessage(f"a {name}, whose compression changes confidences")
         if isinstance(picture, RawPicture) and format_of(picture).dtype == "f4":
             values = rows_of(picture, limits)
-            if not ((values >= 0) & (values <= 1)).all():
+            if not ((values >= -ROUNDING) & (values <= 1 + ROUNDING)).all():
                 raise BadMessage("it holds a confidence that is not from 0 to 1")
-            return np.rint(values.astype(np.float64) * TOP).astype(np.uint16)
+            return np.rint(np.clip(values, 0, 1).astype(np.float64) * TOP).astype(np.uint16)
         levels = to_labels(picture, limits)
         if levels.ndim != 2 or levels.dtype.kind == "i":
             raise BadMessage("it holds colours or signed numbers, not confidences")
@@ -658,6 +665,7 @@ def meaning_of(
     if not counts:
         raise undecodable(labels, problem)
     if confidence is not None:
+        confidence.check(max(map(max, counts)), labels.name)
         return replace(confidence, notes=notes)
     if origin.occurring:
         meaning = find_class_meaning(stated, origin, labels.name)

@@ -189,6 +189,12 @@ def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same():
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
 
 
+def test_rounding_takes_no_confidence_beyond_its_ends():
+    rounded = np.array([[-1e-7, 1.0000001, 0.5]], np.float32)
+    codes = Confidence(0.5).codes(npy_picture(file_of(rounded), Limits()), Limits())
+    assert codes.tolist() == [[0, 65535, 32768]]
+
+
 # --- NPY files as pictures ------------------------------------------------------------------------
 
 LIMITS = Limits(1000)
