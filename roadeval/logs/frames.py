@@ -232,6 +232,7 @@ def settle(
             shown = "shadow" if name == SHADOW else "road"
             names = class_names(reader.name, topics, readers) if is_truth else {}
             meaning = meaning_of(reader, values, shown=shown, names=names)
+            notes += (pairing.note,) if pairing.note else ()
             source = LabelSource(reader.name, reader, meaning, pairing, reason)
             labels[name] = replace(source, notes=notes)
     calibration = calibration_of(image, topics, readers)
@@ -562,16 +563,13 @@ class FrameStream:
             shown = f"{name.removeprefix('/')}: "
             count, away = partners.unpaired(of_all=frames == self.accounting.in_log)
             if count:
-                yield Sentence(
-                    "{}{} of the {} labels of {} belong to no frame: the first is {} ms from the "
-                    "nearest, and at most {} are allowed ({topics.sync_tolerance_ms})",
-                    shown,
-                    count,
-                    len(source.pictures),
-                    source.where,
-                    f"{away / 1e6:.1f}",
-                    f"{source.pairing.tolerance / 1e6:.1f}",
-                )
+                problem = f"{shown}{count} of the {len(source.pictures)} labels of {source.where}"
+                why = "the frame {} ms from the first has another label"
+                if away > source.pairing.tolerance:
+                    why = "the first is {} ms from the nearest, and at most {} are allowed "
+                    why += "({topics.sync_tolerance_ms})"
+                times = (f"{ns / 1e6:.1f}" for ns in (away, source.pairing.tolerance))
+                yield Sentence("{} belong to no frame: {}", problem, Sentence(why, *times))
             if partners.missed:
                 lost = f"{partners.missed} frames have no label: the one in reach lies nearer to"
                 yield f"{shown}{lost} another frame"

@@ -271,6 +271,32 @@ def test_numbers_of_labels_are_told_to_count_the_images_of_all_cameras(tmp_path,
     assert all("also those that `topics.frame_id` leaves out" in note for note in notes)
 
 
+def labels_stamped(path, stamps):
+    """Write a log of six images, with a label under each of some stamps, a moment later."""
+    messages = []
+    for number in range(6):
+        time = SECOND * (number + 1)
+        messages.append(("/camera", time, compressed(time, png(grey(number)))))
+        messages.append(("/labels", time + 9, compressed(stamps(time), png(grey(255)))))
+    return ros2_log(path, messages)
+
+
+def test_labels_without_stamps_are_paired_by_log_times(tmp_path: Path) -> None:
+    selection, frames = read(labels_stamped(tmp_path / "a.mcap", lambda time: 0))
+    assert [frame.labelled for frame in frames] == [True] * 6
+    assert selection.truth.notes == ("its stamps are 0, so log times pair them with frames",)
+
+
+def test_labels_that_share_a_stamp_are_not_told_to_be_too_far_away(tmp_path: Path) -> None:
+    seconds = {1: 1, 2: 1, 3: 3, 4: 3, 5: 3, 6: 6}
+    path = labels_stamped(tmp_path / "a.mcap", lambda time: seconds[time // SECOND] * SECOND)
+    with open_log(path, LogConfig()) as log:
+        stream = log.frames(log.select())
+        assert [frame.labelled for frame in stream] == [True, False, True, False, False, True]
+        (told,) = stream.unpaired()
+    assert told.endswith("belong to no frame: the frame 0.0 ms from the first has another label")
+
+
 def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:
     path = two_cameras(tmp_path / "a.mcap", ["front", "rear"])
     with pytest.raises(LogError, match="no image of the range has left; the first has front"):

@@ -378,6 +378,9 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
     note = ""
     if clock is Clock.STAMP and isinstance(labels, TopicReader):
         check_clocks(images, labels, offset)
+        ends = {labels.stamp(position) for position in (0, len(labels) - 1) if len(labels)}
+        if ends == {0} and images.stamp(0):
+            clock, note = Clock.LOG_TIME, "its stamps are 0, so log times pair them with frames"
     elif clock is Clock.STAMP and isinstance(labels, NamedLabels) and len(labels):
         clock, note = _find_clock(images, labels, camera.tolerance_ns, offset)
     if clock is Clock.STAMP:
