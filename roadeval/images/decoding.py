@@ -79,7 +79,7 @@ def _deep_colours(data: File) -> Array | None:
 
 
 def to_labels(data: File, limits: Limits) -> Array:
-    """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
+    """Decode a label image to ``(H, W)`` numbers, or to ``(H, W, 3)`` if it has colours.
 
     A file with a palette gives its indices, or its greys if no entry has a colour. Three equal
     channels count as one. An image of a single colour that is transparent in parts gives its
@@ -98,8 +98,7 @@ def _label_values(image: Any) -> Array:
         greys = (palette == palette[:, :1]).all() and indices.max() < len(palette)
         return np.ascontiguousarray(palette[indices, 0]) if greys else indices
     if image.mode in _SAMPLES:
-        samples = _samples(image)
-        return samples if samples.dtype.kind != "f" else eight_bits(samples)
+        return _samples(image)
     colours = np.array(image.convert("RGB"))
     opacity = np.array(image.getchannel("A")) if image.mode in {"RGBA", "LA"} else np.full(1, 255)
     clear = opacity < 128
@@ -128,6 +127,16 @@ def without_colours(image: Rgb) -> Array:
     grey = image[..., 0]
     same = np.array_equal(grey, image[..., 1]) and np.array_equal(grey, image[..., 2])
     return np.ascontiguousarray(grey) if same else image
+
+
+def whole_numbers(samples: Array) -> Array:
+    """Return numbers as integers: whole ones as they are, else fractions as levels of 0..255."""
+    if samples.dtype.kind != "f":
+        return samples
+    is_whole = np.isfinite(samples) & (samples == np.rint(samples)) & (np.abs(samples) < 1 << 16)
+    if not is_whole.all():
+        return eight_bits(samples)
+    return samples.astype(np.int32 if samples.min() < 0 else np.uint16)
 
 
 def eight_bits(samples: Array, white: float | None = None) -> npt.NDArray[np.uint8]:

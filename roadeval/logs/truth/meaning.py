@@ -35,12 +35,11 @@ from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.encoding import TopicKind
-from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
+from roadeval.logs.messages.pictures import Picture, PictureSequence
 from roadeval.logs.messages.pixels import (
     ROUNDING,
-    format_of,
+    label_samples,
     lossy_format,
-    rows_of,
     size_of,
     to_labels,
     to_rgb,
@@ -237,12 +236,11 @@ class Confidence:
         """
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes confidences")
-        if isinstance(picture, RawPicture) and format_of(picture).dtype == "f4":
-            values = rows_of(picture, limits)
-            if not ((values >= -ROUNDING) & (values <= 1 + ROUNDING)).all():
+        levels = label_samples(picture, limits)
+        if levels.dtype.kind == "f":
+            if not ((levels >= -ROUNDING) & (levels <= 1 + ROUNDING)).all():
                 raise BadMessage("it holds a confidence that is not from 0 to 1")
-            return np.rint(np.clip(values, 0, 1).astype(np.float64) * TOP).astype(np.uint16)
-        levels = to_labels(picture, limits)
+            return np.rint(np.clip(levels, 0, 1).astype(np.float64) * TOP).astype(np.uint16)
         if levels.ndim != 2 or levels.dtype.kind == "i":
             raise BadMessage("it holds colours or signed numbers, not confidences")
         return levels.astype(np.uint16) * (TOP // 255) if levels.dtype == np.uint8 else levels

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
@@ -187,6 +188,23 @@ def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same():
         codes = confidence.codes(picture, Limits())
         np.testing.assert_array_equal(codes, wide)
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
+
+
+def tiff(array):
+    file = io.BytesIO()
+    Image.fromarray(array).save(file, "tiff")
+    return CompressedPicture(0, "tiff", file.getvalue())
+
+
+@pytest.mark.parametrize("read", [lambda array: npy_picture(file_of(array), Limits()), tiff])
+def test_classes_that_are_stored_as_floats_keep_their_numbers(read):
+    classes = np.array([[0, 1, 2, 255], [0, 0, 1, 7]], np.float32)
+    for rows in (classes, classes[:, :2]):  # also where there are only 0 and 1
+        np.testing.assert_array_equal(to_labels(read(rows), Limits()), rows)
+    fractions = np.array([[0, 0.5, 1, 1]], np.float32)
+    assert to_labels(read(fractions), Limits()).tolist() == [[0, 128, 255, 255]]
+    assert Confidence(0.5).codes(read(fractions), Limits()).tolist() == [[0, 32768, 65535, 65535]]
+    assert Confidence(0.5).codes(read(classes[:, :2]), Limits()).max() == 65535
 
 
 def test_rounding_takes_no_confidence_beyond_its_ends():
