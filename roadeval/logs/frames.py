@@ -204,7 +204,7 @@ def settle(
     """
     settings = config.topics
     topics = [_with_frame_id(topic, readers[topic.name], settings.frame_id) for topic in topics]
-    image, why = choose_image(topics, settings.image)
+    image, why = choose_image(topics, settings.image, settings.of_labels)
     if image.problem or "depth" in image.format.lower():
         _check_readable(readers[image.name], image)
     if config.truth.path:

@@ -367,7 +367,8 @@ class Log:
     def has_camera(self) -> bool:
         """Whether it is clear which topic has the camera's images."""
         try:
-            choose_image(self.topics, self.config.topics.image)
+            settings = self.config.topics
+            choose_image(self.topics, settings.image, settings.of_labels)
         except LogError:
             return False
         return True
