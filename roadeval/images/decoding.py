@@ -79,11 +79,11 @@ def _deep_colours(data: File) -> Array | None:
 
 
 def to_labels(data: File, limits: Limits) -> Array:
-    """Decode a label image to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
+    """Decode a label image to ``(H, W)`` numbers, or to ``(H, W, 3)`` if it has colours.
 
-    A file with a palette gives its indices, or its greys if it has no colours. Three equal channels
-    count as one. An image of a single colour that is transparent in parts gives its opacity. Errors
-    as in `to_rgb`, and if one of several colours is transparent in parts.
+    A file with a palette gives its indices, or its greys if no entry has a colour. Three equal
+    channels count as one. An image of a single colour that is transparent in parts gives its
+    opacity. Errors as in `to_rgb`, and if one of several colours is transparent in parts.
     """
     return upright(_label_values(_decode(data, limits), data), _left_to_turn(data, limits))
 
@@ -94,12 +94,11 @@ def _label_values(image: Any, data: File) -> Array:
     if image.mode == "P":
         indices = np.array(image)
         palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-        used = palette[: int(indices.max()) + 1]
-        greys = (used == used[:, :1]).all() and len(used) > 1
-        return np.ascontiguousarray(used[indices, 0]) if greys else indices
+        # Unused colours count, too: all images of a tool have one palette, and must mean the same.
+        greys = (palette == palette[:, :1]).all() and indices.max() < len(palette)
+        return np.ascontiguousarray(palette[indices, 0]) if greys else indices
     if image.mode in ("L", *_DEEP):
-        samples = _samples(image, data)
-        return samples if samples.dtype.kind != "f" else eight_bits(samples)
+        return _samples(image, data)
     colours = np.array(image.convert("RGB"))
     opacity = np.array(image.getchannel("A")) if image.mode in {"RGBA", "LA"} else np.full(1, 255)
     clear = opacity < 128
@@ -128,6 +127,16 @@ def without_colours(image: Rgb) -> Array:
     grey = image[..., 0]
     same = np.array_equal(grey, image[..., 1]) and np.array_equal(grey, image[..., 2])
     return np.ascontiguousarray(grey) if same else image
+
+
+def whole_numbers(samples: Array) -> Array:
+    """Return numbers as integers: whole ones as they are, else fractions as levels of 0..255."""
+    if samples.dtype.kind != "f":
+        return samples
+    is_whole = np.isfinite(samples) & (samples == np.rint(samples)) & (np.abs(samples) < 1 << 16)
+    if not is_whole.all():
+        return eight_bits(samples)
+    return samples.astype(np.int32 if samples.min() < 0 else np.uint16)
 
 
 def eight_bits(samples: Array, white: float | None = None) -> npt.NDArray[np.uint8]:

@@ -70,6 +70,9 @@ _HASHED: Final = (
 NUMBER: Final = "{number}"
 """Stands for the frame's number in a pattern of names."""
 _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
+_TIME_WITHIN: Final = re.compile(
+    rf"(?P<before>.*?)(?<!\d)(?P<time>{_TIME.pattern})(?!\d)(?P<after>.*)", re.DOTALL
+)
 
 
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
@@ -201,11 +204,11 @@ def order_by_time(files: Sequence[Path]) -> tuple[list[Path], list[int] | None]:
 
     If not every name is a time, or two are the same, return them unchanged, with None.
     """
-    times = {file: time for file in files if (time := time_in(file.stem)) is not None}
-    if len(times) < len(files) or len(set(times.values())) < len(files):
+    times = [time for time in times_in([file.stem for file in files]) if time is not None]
+    if len({*times}) < len(files):
         return list(files), None
-    in_order = sorted(files, key=times.__getitem__)
-    return in_order, [times[file] for file in in_order]
+    in_order = sorted(zip(times, files, strict=True))
+    return [file for _, file in in_order], [time for time, _ in in_order]
 
 
 def first_names(files: Sequence[str | Path]) -> str:
@@ -276,12 +279,48 @@ def bare_name(file: Path) -> str:
     return _SUFFIX.sub("", _KITTI.sub(r"\1_", file.stem))
 
 
-def time_in(name: str) -> int | None:
-    """Return nanoseconds since 1970 if a name is a time."""
-    match = _TIME.fullmatch(name)
-    if match is None:
-        return None
-    seconds, fraction, *others = match.groups()
-    if seconds is not None:
-        return int(seconds) * NS + int((fraction or "").ljust(9, "0"))
-    return next(int(text) * 1000 ** (2 - place) for place, text in enumerate(others) if text)
+def times_alone(names: Sequence[str]) -> Sequence[str]:
+    """Return names without the text that all of them have before, and after, a time.
+
+    They are unchanged if all times are of one second: it may be that of the recording.
+
+    >>> times_alone(["cam_1700000000.5_road", "cam_1700000001.5_road"])
+    ['1700000000.5', '1700000001.5']
+    """
+    matches = [match for match in map(_TIME_WITHIN.fullmatch, names) if match]
+    ends = {(match["before"], match["after"]) for match in matches}
+    seconds = {match["time"][:10] for match in matches}
+    is_shared = len(matches) == len(names) and len(ends) == 1 and len(seconds) > 1
+    return [match["time"] for match in matches] if is_shared else names
+
+
+def times_in(names: Sequence[str]) -> list[int | None]:
+    """Return nanoseconds since 1970 of each name that is a time, else None.
+
+    Digits behind the seconds are decimals. If zeros before them were left out, they count
+    nanoseconds, or micro- or milliseconds; a `LogError` if that is doubtful.
+
+    >>> times_in(["1700000000.5", "1700000001"]), times_in(["1_50000000", "1700000000_50000000"])
+    ([1700000000500000000, 1700000001000000000], [None, 1700000000050000000])
+    """
+    matches = [*map(_TIME.fullmatch, names)]
+    fractions = {match[2] for match in matches if match and (match[2] or "").strip("0")}
+    widths = {*map(len, fractions)}
+    unit = next(width for width in (3, 6, 9) if max(widths, default=9) <= width)
+    may_count = (len(widths) > 1 or widths == {8}) and not any(f[0] == "0" for f in fractions)
+    # Nobody writes zeros behind decimals of different lengths.
+    is_count = may_count and any(len(f) < unit and f[-1] == "0" for f in fractions)
+    if may_count and not is_count and widths & {8, 9} and all(matches):
+        raise LogError(
+            "the digits behind the seconds may be decimals, or nanoseconds without the zeros "
+            "before them",
+            where=first_names(names),
+            remedy="write nine digits",
+        )
+
+    def nanoseconds(seconds: str | None, fraction: str | None, *others: str | None) -> int:
+        if seconds is None:
+            return next(int(t) * 1000 ** (2 - place) for place, t in enumerate(others) if t)
+        return int(seconds) * NS + int((fraction or "").rjust(unit * is_count, "0").ljust(9, "0"))
+
+    return [match and nanoseconds(*match.groups()) for match in matches]

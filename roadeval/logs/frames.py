@@ -204,7 +204,7 @@ def settle(
     """
     settings = config.topics
     topics = [_with_frame_id(topic, readers[topic.name], settings.frame_id) for topic in topics]
-    image, why = choose_image(topics, settings.image)
+    image, why = choose_image(topics, settings.image, settings.of_labels)
     if image.problem or "depth" in image.format.lower():
         _check_readable(readers[image.name], image)
     if config.truth.path:
@@ -227,12 +227,14 @@ def settle(
         if label_topic is not None:
             is_truth, reader = name == TRUTH, readers[label_topic.name]
             pairing = by_time(reader, camera, settings.sync_offset_ms if is_truth else 0.0)
-            check_size(label_topic.size, reader, 0, camera, pairing)
+            notes = check_size(label_topic.size, reader, 0, camera, pairing)
             values = MaskSettings(labels=config.labels if is_truth else LabelSettings())
             shown = "shadow" if name == SHADOW else "road"
             names = class_names(reader.name, topics, readers) if is_truth else {}
             meaning = meaning_of(reader, values, shown=shown, names=names)
-            labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
+            notes += (pairing.note,) if pairing.note else ()
+            source = LabelSource(reader.name, reader, meaning, pairing, reason)
+            labels[name] = replace(source, notes=notes)
     calibration = calibration_of(image, topics, readers)
     if any(calibration) and image.turned != 1 and camera.images.limits.turn:
         reason = "it is of the sensor's rows, and the images are turned ({frames.unturned})"
@@ -561,16 +563,13 @@ class FrameStream:
             shown = f"{name.removeprefix('/')}: "
             count, away = partners.unpaired(of_all=frames == self.accounting.in_log)
             if count:
-                yield Sentence(
-                    "{}{} of the {} labels of {} belong to no frame: the first is {} ms from the "
-                    "nearest, and at most {} are allowed ({topics.sync_tolerance_ms})",
-                    shown,
-                    count,
-                    len(source.pictures),
-                    source.where,
-                    f"{away / 1e6:.1f}",
-                    f"{source.pairing.tolerance / 1e6:.1f}",
-                )
+                problem = f"{shown}{count} of the {len(source.pictures)} labels of {source.where}"
+                why = "the frame {} ms from the first has another label"
+                if away > source.pairing.tolerance:
+                    why = "the first is {} ms from the nearest, and at most {} are allowed "
+                    why += "({topics.sync_tolerance_ms})"
+                times = (f"{ns / 1e6:.1f}" for ns in (away, source.pairing.tolerance))
+                yield Sentence("{} belong to no frame: {}", problem, Sentence(why, *times))
             if partners.missed:
                 lost = f"{partners.missed} frames have no label: the one in reach lies nearer to"
                 yield f"{shown}{lost} another frame"

@@ -339,9 +339,15 @@ class Log:
             count = len(images) if images.sure == images.expected() == len(images) else None
             paths = [*map(Path, selection.names)]
             labels = find_keys(origin, settings.path, settings, images.limits, count, named=paths)
-            return source_beside_log(
+            source = source_beside_log(
                 labels, settings, camera, lambda: labels.digest, offset_ms=offset_ms
             )
+            if self.config.topics.frame_id is None or labels.by != "number":
+                return source
+            doubt = (
+                "the numbers count all images of {}, also those that {topics.frame_id} leaves out"
+            )
+            return replace(source, notes=(*source.notes, Sentence(doubt, images.name)))
         other = open_log(log, LogConfig(frames=self.config.frames))
         self.beside.append(other)
         if topic is None:
@@ -361,7 +367,8 @@ class Log:
     def has_camera(self) -> bool:
         """Whether it is clear which topic has the camera's images."""
         try:
-            choose_image(self.topics, self.config.topics.image)
+            settings = self.config.topics
+            choose_image(self.topics, settings.image, settings.of_labels)
         except LogError:
             return False
         return True

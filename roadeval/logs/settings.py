@@ -122,6 +122,11 @@ class TopicSettings:
     ] = 0.0
     resize_truth: Annotated[bool, Flag("--resize-truth")] = False
 
+    @property
+    def of_labels(self) -> frozenset[str | None]:
+        """The named topics that hold labels or masks, and so no camera's images."""
+        return frozenset((self.truth, self.shadow, *self.masks.values()))
+
 
 @dataclass(frozen=True)
 class CameraSettings:

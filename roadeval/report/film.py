@@ -136,7 +136,10 @@ def encode(pictures: Iterable[Plane], form: str, rate: Fraction, options: dict[s
 
 
 def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) -> Rgb:
-    """Return titled panels, 960 to 1920 pixels across, above a line on colours and the drive."""
+    """Return titled panels, 960 to 1920 pixels across, above a line on colours and the drive.
+
+    Panels that would be higher than 4096 pixels are smaller: an encoder has a greatest size.
+    """
     import cv2
 
     painted = np.hstack([paint(panel) for panel in panels])
@@ -147,7 +150,7 @@ def clip_picture(panels: Sequence[LayerImage], truth: Truth | None, about: str) 
         painted[np.tile((near_road > 0) & (truth == NON_ROAD), len(panels))] = 255
         texts.insert(-1, "white: the true road's edge")
     height, width = painted.shape[:2]
-    across = min(width * -(-960 // width), 1920) // 2 * 2
+    across = min(width * -(-960 // width), 1920, max(4096 * width // height, 64)) // 2 * 2
     titles = np.hstack([_line([panel.title], across // len(panels)) for panel in panels])
     enlarged = _fit(painted, across, round(height * across / width / 2) * 2)
     return np.vstack([titles, enlarged, _line(texts, across)])

@@ -152,10 +152,10 @@ def _how_wrong(name: str, rates: Rates, differences: Sequence[Difference]) -> st
 
 
 def describe_errors(rates: Rates) -> str:
-    """Return how much road is missed and how much else is called road; empty if both are undefined.
+    """Return how much road is missed, and what is taken for road; empty if both are undefined.
 
     >>> describe_errors({"FNR": 0.32, "FPR": 0.0004})
-    'misses 32.0 % of the road and calls almost nothing else road'
+    'misses 32.0 % of the road and takes almost nothing else for road'
     """
     kinds = []
     if defined(missed := rates["FNR"]):
@@ -163,7 +163,7 @@ def describe_errors(rates: Rates) -> str:
         kinds.append(f"misses {share} of the road")
     if defined(added := rates["FPR"]):
         share = f"{percent(added, 1)} % of the rest" if added >= ROUNDING else "almost nothing else"
-        kinds.append(f"calls {share} road")
+        kinds.append(f"takes {share} for road")
     return " and ".join(kinds)
 
 
@@ -190,7 +190,7 @@ def _no_interval(change: Difference) -> str:
     if change.low is None:
         return f"{change.none_because[0].upper()}{change.none_because[1:]}."
     if change.unit == "frames" and change.effective is not None and change.effective < FEW:
-        return f"One drive says little about others: {LEAST_GROUPS} drives would tell."
+        return f"One drive says little about others: {LEAST_GROUPS} would tell."
     return ""
 
 

@@ -349,7 +349,9 @@ def choose_frames(
         raise TrainingError(
             f"all {len(numbers)} labelled frames in the range are used for training{used}, so none "
             "is left to score",
-            remedy=Sentence("set {training.frames} to {}, {}", fewer, WITHOUT_TRAINING),
+            remedy=Sentence("set {training.frames} to {}, {}", fewer, WITHOUT_TRAINING)
+            if fewer + gap < len(numbers)
+            else WITHOUT_TRAINING,
         )
     return Schedule(gap=beside, first=left[0] if left else None)
 

@@ -54,6 +54,7 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
 
 LATE = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
 EMPTY = a_result("empty", a_drive({POST: []}))
+MINE = a_result("net", a_drive({("mine", "post"): [10, 20]}))
 
 
 @pytest.mark.parametrize(
@@ -62,6 +63,7 @@ EMPTY = a_result("empty", a_drive({POST: []}))
         (a_side("a", [10]), a_side("b", [30], digest="d2"), "a and b are of different drives"),
         (a_side("a", [10]), a_side("b", [10], digest=None), "b does not say which log it is from"),
         (a_side("base", [10, 20]), LATE, "no evaluated frame and stage in common"),
+        (a_side("base", [10, 20]), MINE, "and net mine; .* as --variant filtered=mine"),
         (EMPTY, a_side("there", [10] * 12), "empty: nothing was scored"),
         (a_side("there", [10] * 12), EMPTY, "empty: nothing was scored"),
     ],

@@ -34,6 +34,7 @@ def rows_of(change=lambda run, drive: 0.0, runs=RUNS, **columns):
         for place, drive in enumerate(DRIVES):
             added = change(run, drive)
             row = {"run": run, "drive": drive, "camera": "/c", "group": drive, "log_digest": drive}
+            row["source"] = ""
             row |= {"variant": "mine", "stage": "post", "kind": "all", "part": "all", "truth": 1}
             row |= {"frames": 10, "road": 300, "N": 1000, "tag_light": "dusk"[: 4 * (place < 3)]}
             row |= dict.fromkeys(("ERR", "FPR", "FNR"), 0.02 + 0.01 * place + added)
@@ -155,6 +156,15 @@ def test_a_rate_that_did_not_change_was_the_same_before():
     (unchanged,) = judged(rows_of(lambda run, drive: 0.0), "post.mine.ERR > +1pp")
     assert (unchanged.value, unchanged.before) == (0, unchanged.after)
     assert unchanged.after > 0
+
+
+def test_a_change_is_from_and_to_the_rates_of_the_drives_that_changed():
+    def two_at_first(run, drive):
+        return (math.nan, 0.0)[drive in "gh"] if run < 11 else 0.03
+
+    change, level = judged(rows_of(two_at_first), "post.mine.ERR > +1pp", "post.mine.ERR > 1%")
+    assert (change.before, change.after) == pytest.approx((0.085, 0.115))
+    assert level.after == pytest.approx(0.085)
 
 
 def test_a_condition_on_what_is_not_there_is_not_judged():

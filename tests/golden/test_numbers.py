@@ -364,7 +364,7 @@ def test_the_list_of_the_worst_frames(told):
         cells = ["-" if np.isnan(rate) else percent(rate) for rate in rates]
         assert f"{rank} {frame} {' '.join(cells)} " in text
         if rates[2] >= 0.0005:
-            assert f" Misses {100 * rates[2]:.1f} % of the road and calls " in text
+            assert f" Misses {100 * rates[2]:.1f} % of the road and takes " in text
 
 
 # --- The recording --------------------------------------------------------------------------------

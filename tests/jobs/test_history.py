@@ -84,7 +84,8 @@ def test_drives_and_fleets_are_read_in_batches_with_the_rates_that_their_tables_
             part = line.part if line.kind == "region" else "all"
             rates = scores[scores["region"] == part].set_index("drive")["ERR"]
             has_tags = run < 8 or line.kind in ("all", "region")
-            there = rates.index.isin(line.drives["drive"]) & has_tags
+            names = rates.index.astype(str) + "-00000003" * (run == 8)  # as in the fleets
+            there = names.isin(line.drives["drive"]) & has_tags
             of_run = line.drive_rates[run][np.isfinite(line.drive_rates[run])]
             np.testing.assert_array_equal(sorted(of_run), sorted(rates[there]))
     assert np.isfinite(everywhere.drive_rates).sum(axis=1).tolist() == [6] * 8 + [1]
@@ -141,8 +142,21 @@ def test_results_are_read_in_parts_and_those_of_a_drive_as_fleets(nights, made, 
     of_drive = history([nights / "1", *folders])
     (line,) = (line for line in of_drive.lines if line[:5] == made.lines[0][:5])
     is_drive = made.lines[0].drives["drive"] == folders[0].name
-    rates = line.drive_rates[1:, line.drives["drive"] == "drive_0003"]
+    rates = line.drive_rates[1:, line.drives["drive"] == folders[0].name]
     np.testing.assert_array_equal(rates, made.lines[0].drive_rates[[0, 5]][:, is_drive])
+
+
+def test_a_drive_alone_is_the_drive_of_a_fleet_with_its_log(nights, tmp_path):
+    name = "drive_0003-00000003"
+    alone = shutil.copytree(nights / "5" / "results" / name, tmp_path / "alone")
+    summary = json.loads((alone / "summary.json").read_text())
+    summary["run"]["svm"] = {"C": 3}
+    (alone / "summary.json").write_text(json.dumps(summary))
+    (event,) = history([nights / "1", nights / "2", alone]).events
+    assert event.run == 2
+    assert "svm.C 1 to 3" in event.reasons
+    assert not [reason for reason in event.reasons if reason.startswith("new drives")]
+    assert {drive for drive, _, _ in event.frames} == {name}
 
 
 def test_pixels_of_classes_are_lines_beside_those_of_regions(nights, tmp_path):
@@ -245,12 +259,12 @@ def test_the_one_run_that_can_be_read_is_the_base_and_the_other_is_told(nights, 
     shutil.copytree(nights / "7", folder / "7", dirs_exist_ok=True)
     compared = compare([folder, nights / "0"])
     assert [result.label for result in compared.comparison.results] == ["7", "0"]
-    (lost,) = compared.lost
-    assert lost.startswith(str(folder / "1" / "fleet.json"))
-    assert lost in compared.comparison.warnings
+    (warning,) = compared.comparison.warnings
+    assert warning.startswith(str(folder / "1" / "fleet.json"))
+    # Nothing of the compared results is lost.
     words = [str(folder), str(nights / "0")]
-    assert compare_command(words, quiet=True) == ExitCode.LOSS
-    assert capsys.readouterr().err == f"roadeval: lost: {lost}\n"
+    assert compare_command(words, quiet=True) == ExitCode.DONE
+    assert capsys.readouterr().err == f"roadeval: warning: {warning}\n"
     (folder / "7" / "fleet.json").write_text("{")
     with pytest.raises(RoadevalError, match=r"no run of it can be read; .*1/fleet.json"):
         compare([folder, nights / "0"])

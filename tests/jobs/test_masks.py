@@ -174,6 +174,7 @@ def test_masks_of_another_time_or_size_are_refused_unless_they_are_to_be_scaled(
             "`masks.net.labels.road`, and those to leave out with `masks.net.labels.ignore`; or, "
             "for confidences, their threshold",
         ),
+        ({"path": "npy", "threshold": 0.5}, "is 1: these are masks, and no confidences; leave"),
         ({"path": "other.mcap"}, "name a topic of it, as"),
         (
             {"path": "other.mcap:/no"},

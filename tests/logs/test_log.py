@@ -18,7 +18,13 @@ from roadeval.logs.container.records import FileBytes
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.frames import LoggedFrame, Selection
 from roadeval.logs.log import Log, describe, open_log
-from roadeval.logs.settings import FrameSettings, LogConfig, TopicSettings, parse_time
+from roadeval.logs.settings import (
+    FrameSettings,
+    LabelPlace,
+    LogConfig,
+    TopicSettings,
+    parse_time,
+)
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
 from tests.fixtures.flavours import FLAVOURS, file_fields, in_json, scenes
@@ -248,6 +254,48 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
         numbers = [number for number, other in enumerate(names) if other == name]
         assert [frame.number for frame in frames] == numbers
         assert not any("several cameras" in note for note in frames[0].accounting.notes)
+
+
+@pytest.mark.parametrize(("name", "told"), [(None, 0), ("rear", 1)])
+def test_numbers_of_labels_are_told_to_count_the_images_of_all_cameras(tmp_path, name, told):
+    path = two_cameras(tmp_path / "a.mcap", ["front", "rear"] * 3)
+    (tmp_path / "labels").mkdir()
+    for number in range(3):
+        (tmp_path / "labels" / f"{number}.png").write_bytes(png(grey(255 * (number > 0))))
+    config = LogConfig(
+        truth=LabelPlace(str(tmp_path / "labels")), topics=TopicSettings(frame_id=name)
+    )
+    with open_log(path, config) as log:
+        notes = log.select().truth.notes
+    assert len(notes) == told
+    assert all("also those that `topics.frame_id` leaves out" in note for note in notes)
+
+
+def labels_stamped(path, stamps):
+    """Write a log of six images, with a label under each of some stamps, a moment later."""
+    messages = []
+    for number in range(6):
+        time = SECOND * (number + 1)
+        messages.append(("/camera", time, compressed(time, png(grey(number)))))
+        messages.append(("/labels", time + 9, compressed(stamps(time), png(grey(255)))))
+    return ros2_log(path, messages)
+
+
+def test_labels_without_stamps_are_paired_by_log_times(tmp_path: Path) -> None:
+    selection, frames = read(labels_stamped(tmp_path / "a.mcap", lambda time: 0))
+    assert [frame.labelled for frame in frames] == [True] * 6
+    (note,) = selection.truth.notes
+    assert note.startswith("its stamps are 0, so log times pair it: what was logged late")
+
+
+def test_labels_that_share_a_stamp_are_not_told_to_be_too_far_away(tmp_path: Path) -> None:
+    seconds = {1: 1, 2: 1, 3: 3, 4: 3, 5: 3, 6: 6}
+    path = labels_stamped(tmp_path / "a.mcap", lambda time: seconds[time // SECOND] * SECOND)
+    with open_log(path, LogConfig()) as log:
+        stream = log.frames(log.select())
+        assert [frame.labelled for frame in stream] == [True, False, True, False, False, True]
+        (told,) = stream.unpaired()
+    assert told.endswith("belong to no frame: the frame 0.0 ms from the first has another label")
 
 
 def test_a_camera_that_no_image_names_is_refused(tmp_path: Path) -> None:

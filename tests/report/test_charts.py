@@ -210,6 +210,13 @@ def test_clips_of_images_of_any_size_are_960_to_1920_pixels_across(height, width
     assert frame.height == pytest.approx(48 + height * frame.width / (width * panels), abs=1)
 
 
+def test_a_clip_of_a_high_narrow_image_can_be_encoded():
+    image = LayerImage("a", np.full((400, 6, 3), 90, np.uint8))
+    picture = clip_picture([image, image], None, "drive")
+    assert picture.shape[0] <= 4096 + 48
+    assert encode([picture], "mp4", 2, {})
+
+
 def test_equal_pictures_give_equal_films():
     images = {CAMERA: np.full((8, 8, 3), 90, np.uint8)}
     one, other = (make_film([0, 1], [CAMERA], lambda _: images, 60_000) for _ in range(2))

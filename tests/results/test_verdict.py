@@ -59,28 +59,30 @@ CASES = {
     "the filter helps": (
         (PAIR, filtered(BETTER, UNSURE)),
         "filtered: 2.8 % of the pixels are wrong (91 frames). It misses 5.6 % of the road and "
-        "calls 1.4 % of the rest road. That is 3.3 points (may be chance) better than blind, which "
+        "takes 1.4 % of the rest for road. That is 3.3 points (may be chance) better than "
+        "blind, which "
         "ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 on others) better than without the "
         "filter. Next: try --variant robust.",
     ),
     "the filter harms": (
         (drive(filtered=0.154, unfiltered=0.062), filtered(WORSE, WORSE)[:1]),
         "filtered: 15.4 % of the pixels are wrong (91 frames). It misses 30.8 % of the road and "
-        "calls 7.7 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
+        "takes 7.7 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
         "than without the filter. There is no baseline: no labelled frame was used for training. "
         "Best here is unfiltered: 6.2 %. Next: try --variant robust.",
     ),
     "both may be chance": ((PAIR, filtered(UNSURE, UNSURE)), None),
     "one scene": (
         (drive(robust=0.028, blind=0.12), against("blind", robust=ONE_SCENE)),
-        "robust: 2.8 % of the pixels are wrong (91 frames). It misses 5.6 % of the road and calls "
-        "1.4 % of the rest road. That is 9.2 points better than blind, which ignores the "
-        "image. One drive says little about others: 6 drives would tell.",
+        "robust: 2.8 % of the pixels are wrong (91 frames). It misses 5.6 % of the road and takes "
+        "1.4 % of the rest for road. That is 9.2 points better than blind, which ignores the "
+        "image. One drive says little about others: 6 would tell.",
     ),
     "a network alone that misses road": (
         (NO_ROAD_FOUND, [], {"net": AT}),
-        "net: 5.5 % of the pixels are wrong (90 frames). It misses 32.2 % of the road and calls "
-        "almost nothing else road. There is no baseline: no labelled frame was used for training.",
+        "net: 5.5 % of the pixels are wrong (90 frames). It misses 32.2 % of the road and takes "
+        "almost nothing else for road. There is no baseline: no labelled frame was used "
+        "for training.",
     ),
     "a threshold is better": (
         (
@@ -88,8 +90,8 @@ CASES = {
             against("blind", net=BETTER),
             {"net": AT},
         ),
-        "net: 5.5 % of the pixels are wrong (91 frames). It misses 11.0 % of the road and calls "
-        "2.8 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) better than "
+        "net: 5.5 % of the pixels are wrong (91 frames). It misses 11.0 % of the road and takes "
+        "2.8 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) better than "
         "blind, which ignores the image. Set `threshold = 0.01380`: then 2.7 % are wrong.",
     ),
     "what was brought is the focus": (
@@ -98,8 +100,8 @@ CASES = {
     ),
     "what was brought is not the best": (
         (drive(filtered=0.01, unfiltered=0.02, mine=0.05, blind=0.1), against("blind", mine=WORSE)),
-        "mine: 5.0 % of the pixels are wrong (91 frames). It misses 10.0 % of the road and calls "
-        "2.5 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse than "
+        "mine: 5.0 % of the pixels are wrong (91 frames). It misses 10.0 % of the road and takes "
+        "2.5 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse than "
         "blind, which ignores the image. Best here is filtered: 1.0 %.",
     ),
     "four variants": (
@@ -109,18 +111,19 @@ CASES = {
     "tuned": ((drive(mine=0.05, mine_tuned=0.03, blind=0.1), against("blind", mine=BETTER)), None),
     "masks of some frames": (
         (drive(unfiltered=0.1) | drive(half=0.01, frames=40), []),
-        "half: 1.0 % of the pixels are wrong (40 frames). It misses 2.0 % of the road and calls "
-        "0.5 % of the rest road. There is no baseline: no labelled frame was used for training.",
+        "half: 1.0 % of the pixels are wrong (40 frames). It misses 2.0 % of the road and takes "
+        "0.5 % of the rest for road. There is no baseline: no labelled frame was used for "
+        "training.",
     ),
     "as good as the baseline": (
         (drive(net=0.054, blind=0.054), against("blind", net=ZERO)),
-        "net: 5.4 % of the pixels are wrong (91 frames). It misses 10.8 % of the road and calls "
-        "2.7 % of the rest road. That is exactly as good as blind, which ignores the image.",
+        "net: 5.4 % of the pixels are wrong (91 frames). It misses 10.8 % of the road and takes "
+        "2.7 % of the rest for road. That is exactly as good as blind, which ignores the image.",
     ),
     "three frames": (
         (drive(3, net=0.1, blind=0.12), against("blind", net=SHORT)),
-        "net: 10.0 % of the pixels are wrong (3 frames). It misses 20.0 % of the road and calls "
-        "5.0 % of the rest road. That is 3.3 points better than blind, which ignores the "
+        "net: 10.0 % of the pixels are wrong (3 frames). It misses 20.0 % of the road and takes "
+        "5.0 % of the rest for road. That is 3.3 points better than blind, which ignores the "
         "image. 3 frames are too few for an interval (10 are needed).",
     ),
     "undefined": (
@@ -134,13 +137,14 @@ CASES = {
     "a fleet": (
         (fleet(8, robust=0.02, blind=0.1), against("blind", robust=OF_DRIVES)),
         "robust: 2.0 % of the pixels are wrong (8 drives). It misses 4.0 % of the road and "
-        "calls 1.0 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) better "
+        "takes 1.0 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on "
+        "others) better "
         "than blind, which ignores the image.",
     ),
     "a fleet of three": (
         (fleet(3, robust=0.02, blind=0.1), against("blind", robust=FEW_DRIVES)),
         "robust: 2.0 % of the pixels are wrong (3 drives). It misses 4.0 % of the road and "
-        "calls 1.0 % of the rest road. That is 3.3 points better than blind, which ignores "
+        "takes 1.0 % of the rest for road. That is 3.3 points better than blind, which ignores "
         "the image. 3 drives are too few for an interval (6 are needed).",
     ),
     "a fleet of one": ((fleet(1, robust=0.02, blind=0.1), against("blind", robust=BETTER)), None),
@@ -155,7 +159,7 @@ CASES = {
             {"mine": AT},
         ),
         "filtered: 15.4 % of the pixels are wrong (91 frames). It misses 30.8 % of the road and "
-        "calls 7.7 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
+        "takes 7.7 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
         "than blind, which ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
         "than without the filter. Best here is mine: 1.9 %.",
     ),
@@ -165,15 +169,17 @@ CASES = {
             against("blind", net=ONE_SCENE),
             {"net": AT | {"lines": 'decide = "argmax"\nthreshold = 0.01380'}},
         ),
-        "net: 5.5 % of the pixels are wrong (91 frames). It misses 11.0 % of the road and calls "
-        "2.8 % of the rest road. That is 9.2 points better than blind. One drive says little about "
-        'others: 6 drives would tell. Best here is robust: 1.0 %. Set `decide = "argmax"`, '
+        "net: 5.5 % of the pixels are wrong (91 frames). It misses 11.0 % of the road and takes "
+        "2.8 % of the rest for road. That is 9.2 points better than blind. One drive says "
+        "little about "
+        'others: 6 would tell. Best here is robust: 1.0 %. Set `decide = "argmax"`, '
         "`threshold = 0.01380`: then 2.7 % are wrong.",
     ),
     "a threshold that is worse here": (
         ({"net": {"post": rates(0.02) | {"pooled_ERR": 0.02}}}, [], {"net": AT}),
-        "net: 2.0 % of the pixels are wrong (91 frames). It misses 4.0 % of the road and calls "
-        "1.0 % of the rest road. There is no baseline: no labelled frame was used for training.",
+        "net: 2.0 % of the pixels are wrong (91 frames). It misses 4.0 % of the road and takes "
+        "1.0 % of the rest for road. There is no baseline: no labelled frame was used for "
+        "training.",
     ),
     "nothing is road above the best threshold": (
         (
@@ -181,13 +187,15 @@ CASES = {
             [],
             {"net": AT | {"threshold": 1.0, "ERR": 0.2}},
         ),
-        "net: 40.0 % of the pixels are wrong (91 frames). It misses 80.0 % of the road and calls "
-        "20.0 % of the rest road. There is no baseline: no labelled frame was used for training.",
+        "net: 40.0 % of the pixels are wrong (91 frames). It misses 80.0 % of the road and takes "
+        "20.0 % of the rest for road. There is no baseline: no labelled frame was used "
+        "for training.",
     ),
     "as good as another, as printed": (
         (drive(mine=0.0104, filtered=0.0101), []),
-        "mine: 1.0 % of the pixels are wrong (91 frames). It misses 2.1 % of the road and calls "
-        "0.5 % of the rest road. There is no baseline: no labelled frame was used for training.",
+        "mine: 1.0 % of the pixels are wrong (91 frames). It misses 2.1 % of the road and takes "
+        "0.5 % of the rest for road. There is no baseline: no labelled frame was used for "
+        "training.",
     ),
     "a rig": ((drive(filtered=0.02, unfiltered=0.03, blind=0.1), filtered(BETTER, BETTER)), None),
 }
@@ -243,14 +251,14 @@ def test_the_verdict_on_a_chosen_focus_speaks_of_it_and_its_own_differences():
     effects = [*filtered(BETTER, BETTER), *against("blind", mine=BETTER, unfiltered=WORSE)]
     assert verdict(totals, effects, focus="unfiltered") == (
         "unfiltered: 12.0 % of the pixels are wrong (91 frames). It misses 24.0 % of the road and "
-        "calls 6.0 % of the rest road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
+        "takes 6.0 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
         "than blind, which ignores the image. Best here is mine: 1.9 %."
     )
 
 
 def test_a_share_that_would_read_as_nothing_is_said_in_words():
     assert describe_errors({"FNR": 0.0004, "FPR": 0.0006}) == (
-        "misses almost nothing of the road and calls 0.1 % of the rest road"
+        "misses almost nothing of the road and takes 0.1 % of the rest for road"
     )
     assert describe_errors({"FNR": float("nan"), "FPR": float("nan")}) == ""
 
@@ -286,7 +294,7 @@ OTHER = {"ERR": 0.2}, {"ERR": 0.062}
             ONE_SCENE,
             SAME,
             "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). One drive says "
-            "little about others: 6 drives would tell.",
+            "little about others: 6 would tell.",
         ),
         (
             SHORT,

@@ -63,8 +63,7 @@ def compare(
     left out. One drive is judged over its frames, several drives are judged over the drives.
     Results of different drives are not compared. Exit code 4 if a --fail-if condition holds; 1 if
     one cannot be judged, for example because two results share fewer than ten frames, or fewer than
-    half the frames of the smaller one; 3 if drives of a fleet failed (no number includes them), or
-    if a run of the base folder cannot be read.
+    half the frames of the smaller one; 3 if drives of a fleet failed (no number includes them).
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding

@@ -280,6 +280,7 @@ def _compare_two(
             continue
         base_rows = base.table("frames", new_keys)
         frames["base"] += _count_frames(base_rows)
+        variants = [values_of(rows, "variant") for rows in (base_rows, new_rows)]
         pairs = pairing.common_masks(base_rows, new_rows)
         common = {*tables.keys_of(pairs)[0]}
         without_frames += [drive_names[key] for key in new_keys.values() if key not in common]
@@ -299,10 +300,7 @@ def _compare_two(
         parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups, [TESTED]))
     if not masks:
-        raise RoadevalError(
-            f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
-            "nothing can be compared; replay the same range into both"
-        )
+        raise _nothing_shared(labels, *variants)
     one_camera = len(matched) == 1  # then a number names a frame
     disagreed: Iterator[pairing.Disagreement] = iter(())
     if one_camera and across_variants:
@@ -326,6 +324,22 @@ def _compare_two(
         warnings=tuple(_warnings(labels, without_frames, frames, changed)),
         settings=settings,
         classes=tuple(_class_changes(new.label, old_classes, new_classes)),
+    )
+
+
+def _nothing_shared(
+    labels: tuple[str, str], names: Sequence[str], others: Sequence[str]
+) -> RoadevalError:
+    """Return the error of two results without a common mask; ``names`` are the base's variants."""
+    base, new = labels
+    if {*names} & {*others}:
+        return RoadevalError(
+            f"{base} and {new} have no evaluated frame and stage in common, so nothing can be "
+            "compared; replay the same range into both"
+        )
+    return RoadevalError(
+        f"{base} has the variants {', '.join(names)}, and {new} {', '.join(others)}",
+        remedy=f"name those to compare, as --variant {names[0]}={others[0]}",
     )
 
 

@@ -29,8 +29,9 @@ from roadeval.evaluation.tables import KEY, group_rows, only, values_of
 if TYPE_CHECKING:
     import pandas as pd
 
-PIXELS: Final = ("log_digest", "truth", "frames", "road", "N")
-"""Columns that tell whether two runs scored the same pixels of a drive, see `number_pixels`."""
+PIXELS: Final = ("source", "camera", "log_digest", "truth", "frames", "road", "N")
+"""Columns that tell whether two runs scored the same pixels of a drive, see `number_pixels`; the
+``source`` is the name of a drive that its log does not tell from others, else empty."""
 RATES: Final = (TESTED, "FPR", "FNR")
 """The rates of a whole mask that are searched; of a part of its pixels only the first is."""
 
@@ -81,7 +82,7 @@ def number_pixels(rows: pd.DataFrame) -> pd.Series[int]:
     """
     from pandas.util import hash_pandas_object
 
-    return hash_pandas_object(rows[[*KEY, *PIXELS]], index=False)
+    return hash_pandas_object(rows[[*PIXELS]], index=False)
 
 
 def find_lines(
@@ -257,7 +258,9 @@ def judge_last(
             mean, noise = difference.mean, 2 * line.noise * math.sqrt(1 + 1 / len(runs[0]))
             below, above = (math.hypot(mean - b, noise) for b in (difference.low, difference.high))
             difference = replace(difference, low=mean - below, high=mean + above)
-        new = float(line.rates[-1])
+        # A change is of the drives that were there before; a rate is of all drives.
+        of_groups = rows.groupby("group")["after"].mean()
+        new = float(of_groups.mean() if condition.is_change else line.rates[-1])
         base = new - difference.mean
         rate = condition.rate
         about = label, line.variant, line.stage, True, len(rows), settings.least_frames

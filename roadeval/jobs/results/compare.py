@@ -51,7 +51,7 @@ class Compared:
     recordings: Mapping[str, DriveResult]
     """The recordings by the results' labels; a folder has none."""
     lost: tuple[str, ...] = ()
-    """Drives of a fleet that failed, and runs that cannot be read; the warnings name them, too."""
+    """Drives of a fleet that failed; the warnings name them, too."""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -111,8 +111,8 @@ def compare(
         result.name if across else side.label for side, result in labelled if not result.complete
     )
     ends = (f"{name} is a partial recording: the end of its drive is missing" for name in cut)
-    lost = dict.fromkeys([*filter(None, map(_failure_sentence, opened)), *unread])
-    comparison = replace(comparison, warnings=(*lost, *ends, *comparison.warnings))
+    lost = dict.fromkeys(filter(None, map(_failure_sentence, opened)))
+    comparison = replace(comparison, warnings=(*lost, *unread, *ends, *comparison.warnings))
     one_drive_sides = sides if across and len(opened_side.scored) == 1 else one_drive(sides)
     recordings = {
         side.label: result.drive

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -154,7 +154,8 @@ def history(
     settings, focus = newest.evaluation, newest.focus or ""
     tags = {str(name): str(name)[len(TAG) :] for name in rows if str(name).startswith(TAG)}
     lines = search.find_lines(rows, tags, len(runs), settings.confidence)
-    read = lru_cache(4 * NEAR)(partial(_read_frames, runs))
+    logs = {*rows[[*KEY, "log_digest"]].drop_duplicates().itertuples(index=False, name=None)}
+    read = lru_cache(4 * NEAR)(partial(_read_frames, runs, logs))
     within = partial(_within_drive, read, settings)
     events = [
         replace(event, reasons=[*_reasons(runs, event)] or ["nothing that the results know of"])
@@ -324,6 +325,10 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     logs = logs.merge(
         only(scores, region=ALL)[[*RUN_KEY, "truth"]].drop_duplicates(RUN_KEY), on=RUN_KEY
     )
+    # A fleet, its folder elsewhere and a replay alone call a log by other names.
+    copies = logs.duplicated(["run", "camera", "log_digest"], keep=False)
+    has_log = logs["log_digest"].astype(object).fillna("") != ""
+    logs["source"] = logs["drive"].astype(object).mask(has_log & ~copies, "")
     for other in ("log_digest", "drive"):
         logs["group"] = logs["group"].astype(object).fillna(logs[other].astype(object))
     logs["group"] = logs["group"].astype("category")
@@ -332,15 +337,27 @@ def _join_tables(scores: pd.DataFrame, drives: pd.DataFrame, classes: pd.DataFra
     rows = concatenate(parts) if len(parts) > 1 else parts[0]
     # If the categories differ, a merge turns them into texts.
     rows = rows.merge(logs.astype({name: rows[name].dtype for name in KEY}), on=RUN_KEY)
-    return rows.assign(pixels=search.number_pixels(rows)).drop(columns=["truth", "road", "N"])
+    return rows.assign(pixels=search.number_pixels(rows)).drop(
+        columns=["source", "truth", "road", "N"]
+    )
 
 
-def _read_frames(runs: Sequence[RunFacts], run: int, drive: tuple[str, str]) -> pd.DataFrame:
-    """Return the rows of ``frames`` of final masks on a drive; none if they are gone."""
+def _read_frames(
+    runs: Sequence[RunFacts], logs: Set[tuple[str, ...]], run: int, drive: tuple[str, str]
+) -> pd.DataFrame:
+    """Return the rows of ``frames`` of final masks on a drive; none if they are gone.
+
+    A run that calls the drive by another name has it by its log: ``logs`` are drives, cameras and
+    their logs.
+    """
     tables = [read_table("frames", "")]
     for path in runs[run].paths:
         with suppress(RoadevalError):
-            tables.append(Result(path).table("frames", [drive]))
+            result = Result(path)
+            drives = [d for d in result.compared if d.camera == drive[1]]
+            keys = [d.key for d in drives if d.key == drive]
+            keys += [d.key for d in drives if (*drive, d.digest) in logs]
+            tables.append(result.table("frames", keys[:1]).assign(drive=drive[0]))
     return finals(concatenate(tables))
 
 
@@ -379,8 +396,10 @@ def _reasons(runs: Sequence[RunFacts], event: Event) -> Iterator[str]:
         "uncommitted changes": (old.origin.dirty, new.origin.dirty),
     }
     with suppress(RoadevalError):  # one of several results may be damaged
-        drives = {drive.key: drive for drive in before.compared}
-        parts |= changed_settings([(drives[d.key], d) for d in after.compared if d.key in drives])
+        digests = {(d.digest, d.camera): d for d in before.compared}
+        keys = {d.key: d for d in before.compared}
+        pairs = [(keys.get(d.key) or digests.get((d.digest, d.camera)), d) for d in after.compared]
+        parts |= changed_settings([(base, new) for base, new in pairs if base])
     stated = [
         {f"label {name}": value for name, value in run.origin.labels.items()}
         | (facts.versions if isinstance(facts, Facts) else {"roadeval": facts.version})

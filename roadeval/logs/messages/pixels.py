@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from roadeval.data import Rgb
 from roadeval.images import decoding, formats
-from roadeval.images.decoding import eight_bits, without_colours
+from roadeval.images.decoding import eight_bits, whole_numbers, without_colours
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.container.records import Buffer
 from roadeval.logs.errors import BadMessage
@@ -26,6 +26,9 @@ from roadeval.logs.messages.pictures import (
 )
 
 Array = npt.NDArray[Any]
+
+ROUNDING: Final = 1e-3
+"""How far rounding, as to 16 bits, may move a fraction beyond 0 or 1."""
 
 
 @dataclass(frozen=True)
@@ -172,12 +175,20 @@ def deep_samples(picture: Picture, limits: Limits) -> Array | None:
 def to_labels(picture: Picture, limits: Limits) -> Array:
     """Decode a label picture to ``(H, W)`` whole numbers, or to ``(H, W, 3)`` if it has colours.
 
-    An image with a palette gives its indices, or its greys if it has no colours. Three equal
+    Fractions become levels of 0..255. Errors as in `label_samples`.
+    """
+    return whole_numbers(label_samples(picture, limits))
+
+
+def label_samples(picture: Picture, limits: Limits) -> Array:
+    """Decode a label picture to ``(H, W)`` numbers, or to ``(H, W, 3)`` if it has colours.
+
+    An image with a palette gives its indices, or its greys if no entry has a colour. Three equal
     channels count as one. A `BadMessage` as in `to_rgb`.
     """
     if isinstance(picture, RawPicture):
         layout = format_of(picture)
-        if layout.is_grey and layout.dtype != "f4":
+        if layout.is_grey:
             rows = rows_of(picture, limits)
             return rows.astype(np.int16) if layout.dtype == "i1" else rows
     elif isinstance(picture, CompressedPicture):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from roadeval.logs.errors import LogError
@@ -59,14 +59,17 @@ def words(name: str) -> frozenset[str]:
     return parts | {"groundtruth"} if {"ground", "truth"} <= parts else parts
 
 
-def choose_image(topics: Sequence[TopicInfo], setting: str | None) -> tuple[TopicInfo, str]:
-    """Choose the camera's topic; return it and why.
+def choose_image(
+    topics: Sequence[TopicInfo], setting: str | None, others: Collection[str | None] = ()
+) -> tuple[TopicInfo, str]:
+    """Choose the camera's topic, which is none of ``others``; return it and why.
 
     A `LogError` if the named topic is missing or no image, or if none or several are candidates.
     """
     if setting is not None:
         return named(topics, setting, "topics.image"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
+    images = [topic for topic in images if topic.name not in others] or images
     candidates = [topic for topic in images if not _looks_like_label(topic)]
     colours = [
         topic

@@ -19,6 +19,7 @@ from roadeval.images.formats import ImageError, Limits, Size
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.files import IMAGES, first_names, list_files, prefer_ids
 from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
+from roadeval.logs.messages.pixels import ROUNDING
 from roadeval.logs.settings import AUDIT, MaskSettings
 from roadeval.logs.truth import formats
 from roadeval.logs.truth.named_labels import LabelSet, NamedLabel
@@ -248,12 +249,12 @@ def npy_picture(data: bytes, limits: Limits) -> RawPicture:
     limits.check(width, height)
     kind, greatest = array.dtype.kind, np.iinfo(np.uint16).max
     with np.errstate(invalid="ignore"):
-        fits = np.isfinite(array) & (array >= 0) if kind == "f" else array <= greatest
+        fits = np.isfinite(array) & (array >= -ROUNDING) if kind == "f" else array <= greatest
     if wrong := array[~fits].tolist():
         what = "a class nor a confidence" if kind == "f" else "at most 65535 nor a fraction"
         raise BadMessage(f"it holds {wrong[0]}, which is neither {what}")
     if kind == "f":
-        encoding, samples = "32FC1", array.astype("<f4")
+        encoding, samples = "32FC1", np.maximum(array, 0).astype("<f4")
     elif kind == "i" and (array < 0).any():
         encoding, samples = "32SC1", np.maximum(array, np.iinfo(np.int32).min).astype("<i4")
     elif array.dtype.itemsize == 1:

@@ -35,11 +35,11 @@ from roadeval.images.formats import Limits, Size
 from roadeval.logs.errors import BadMessage, FrameError, LogError, UnclearLabelsError
 from roadeval.logs.files import is_shown
 from roadeval.logs.messages.encoding import TopicKind
-from roadeval.logs.messages.pictures import Picture, PictureSequence, RawPicture
+from roadeval.logs.messages.pictures import Picture, PictureSequence
 from roadeval.logs.messages.pixels import (
-    format_of,
+    ROUNDING,
+    label_samples,
     lossy_format,
-    rows_of,
     size_of,
     to_labels,
     to_rgb,
@@ -222,6 +222,12 @@ class Confidence:
         probability = self.codes(picture, limits)
         return Labels(self.road(probability), probability=probability)
 
+    def check(self, greatest: int, name: str) -> None:
+        """Raise a `LogError` if the greatest code of some maps tells that they are masks."""
+        if greatest in (1, TOP // 255):  # 1 of 65535, or of 255
+            problem = f"the greatest number of {name} is 1: these are masks, and no confidences"
+            raise LogError(problem, remedy="leave out the threshold, or write fractions")
+
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
 
@@ -230,12 +236,11 @@ class Confidence:
         """
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes confidences")
-        if isinstance(picture, RawPicture) and format_of(picture).dtype == "f4":
-            values = rows_of(picture, limits)
-            if not ((values >= 0) & (values <= 1)).all():
+        levels = label_samples(picture, limits)
+        if levels.dtype.kind == "f":
+            if not ((levels >= -ROUNDING) & (levels <= 1 + ROUNDING)).all():
                 raise BadMessage("it holds a confidence that is not from 0 to 1")
-            return np.rint(values.astype(np.float64) * TOP).astype(np.uint16)
-        levels = to_labels(picture, limits)
+            return np.rint(np.clip(levels, 0, 1).astype(np.float64) * TOP).astype(np.uint16)
         if levels.ndim != 2 or levels.dtype.kind == "i":
             raise BadMessage("it holds colours or signed numbers, not confidences")
         return levels.astype(np.uint16) * (TOP // 255) if levels.dtype == np.uint8 else levels
@@ -290,8 +295,8 @@ def find_meaning(
 ) -> ClassMap:
     """Find the meaning of the values of label pictures, which show road or ``shown``.
 
-    ``pictures`` are the values, or packed colours, of each of some pictures. A `LogError` if a
-    named value does not occur; or if none is named, and the values are class ids or have different
+    ``pictures`` are the values, or packed colours, of each of some pictures. A `LogError` if no
+    named value of road occurs; or if none is named, and the values are class ids or have different
     meanings in different pictures.
     """
     values = sorted({value for picture in pictures for value in picture})
@@ -303,16 +308,23 @@ def find_meaning(
         text = _color_name(value) if labels.road_colors else str(value)
         return f"{text} ({names[value]})" if value in names else text
 
-    there = f"{name}, whose frames hold {_listed(map(text_of, values))}"
+    there = f"{name}: the labels that were looked at hold {_listed(map(text_of, values))}"
     if labels.road or labels.road_colors:
-        # A class that has a name may be rare.
-        codes = {value: value for value in (*values, *names)}
+        ending = "_colors" if labels.road_colors else ""
+        road, other = labels.road, labels.ignore
         if labels.road_colors:
-            colors = (map(_pack_color, labels.road_colors), map(_pack_color, labels.ignore_colors))
-            meaning = _as_named(*colors, codes, there, text=text_of, ending="_colors")
-            return replace(meaning, names=names)
-        meaning = _as_named(labels.road, labels.ignore, codes, there, text=text_of)
-        meaning = replace(meaning, names=names)
+            road, other = (
+                tuple(map(_pack_color, colors))
+                for colors in (labels.road_colors, labels.ignore_colors)
+            )
+        # A class that has a name may be rare, and so may all but one of those of road.
+        codes: dict[Any, int] = {value: value for value in (*values, *names)}
+        rare = [v for v in (*road, *other) if isinstance(v, int) and v not in codes]
+        rare = rare if codes.keys() & {*road} else []
+        codes |= {value: value for value in rare}
+        meaning = _as_named(road, other, codes, there, text=text_of, ending=ending)
+        unseen = f"no label that was looked at holds {_listed(map(text_of, rare))}: is it rare?"
+        meaning = replace(meaning, names=names, notes=(unseen,) if rare else ())
         unnamed = any(value < 0 and value not in meaning.meaning for value in values)
         return replace(meaning, words=f"{meaning.words}; {NO_LABEL}") if unnamed else meaning
     for truths in _MASKS:
@@ -572,16 +584,30 @@ def size_problem(label: str, theirs: Size, image: str, ours: Size, *, resize: bo
             "or leave these as they are stored with {frames.unturned}",
             sizes,
         )
+    if is_stretched(theirs, ours):
+        return Sentence(
+            "{}, another shape: fill labels of a part of the image up to its size, or stretch "
+            "labels of the whole image with {topics.resize_truth}",
+            sizes,
+        )
     return Sentence("{}: scale the labels with {topics.resize_truth}", sizes)
+
+
+def is_stretched(theirs: Size, ours: Size) -> bool:
+    """Return whether scaling changes a label's shape, by more than sizes are rounded."""
+    return abs(theirs[0] * ours[1] - theirs[1] * ours[0]) > max(theirs + ours)
 
 
 def check_size(
     size: Size | None, labels: LabelPictures, position: int, camera: Camera, pairing: Pairing
-) -> None:
-    """Raise a `LogError` if a label has another size than its image, and labels are not scaled."""
+) -> tuple[str, ...]:
+    """Return a warning if scaling changes a label's shape.
+
+    A `LogError` if a label has another size than its image, and labels are not scaled.
+    """
     expected = camera.topic.size
     if size is None or expected is None or size == expected:
-        return
+        return ()
     image = next(frames_of(pairing, position, position + 1), None)
     if image is not None:
         with suppress(BadMessage, FrameError):
@@ -589,6 +615,9 @@ def check_size(
     sizes = labels.place(position), size, f"but {camera.topic.name} is", expected
     if problem := size_problem(*sizes, resize=camera.resize_labels):
         raise LogError(problem)
+    stretch = "labels of {}x{} are stretched to {}x{}, another shape".format(*size, *expected)
+    warning = f"{stretch}: if they show a part of the image, they do not fit it"
+    return (warning,) if is_stretched(size, expected) else ()
 
 
 def undecodable(pictures: LabelPictures, problem: str) -> LogError:
@@ -617,12 +646,13 @@ def meaning_of(
     stated = settings.labels.with_values(labels.name, names, origin.classes)
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []
-    problem = ""
+    problem, notes = "", tuple[str, ...]()
     for position, picture in samples(labels):
         file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
         try:
             if camera and pairing:
-                check_size(size_of(picture, labels.limits), labels, position, camera, pairing)
+                size = size_of(picture, labels.limits)
+                notes = check_size(size, labels, position, camera, pairing) or notes
             if confidence is None:
                 values = count_values(picture, stated, labels.name, labels.limits, file)
             else:
@@ -633,11 +663,13 @@ def meaning_of(
     if not counts:
         raise undecodable(labels, problem)
     if confidence is not None:
-        return confidence
+        confidence.check(max(map(max, counts)), labels.name)
+        return replace(confidence, notes=notes)
     if origin.occurring:
         meaning = find_class_meaning(stated, origin, labels.name)
     else:
         meaning = find_meaning(stated, counts, labels.name, shown)
+    meaning = replace(meaning, notes=(*meaning.notes, *notes))
     pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()
     for value, count in pixels.items():
@@ -657,4 +689,4 @@ def meaning_of(
         f"{100 * road / labelled:.2f}",
         shares,
     )
-    return replace(meaning, notes=(doubt,))
+    return replace(meaning, notes=(*meaning.notes, doubt))

@@ -28,7 +28,8 @@ from roadeval.logs.files import (
     list_files,
     match_name,
     order_by_time,
-    time_in,
+    times_alone,
+    times_in,
     without_hashes,
 )
 from roadeval.logs.messages.pictures import Picture
@@ -201,14 +202,17 @@ def _keys_of(
     if images is not None:
         places = {image: place for place, image in enumerate(images)}
         return "name", {file: places[image] for file, image in images_of([*files], images).items()}
-    times = {file: time for file in files if (time := time_in(bare_name(file))) is not None}
-    are_times = len(times) == len(files) and all(len(bare_name(file)) > SHORT for file in files)
+    names = [*map(bare_name, files)]
+    texts = names if NUMBER in settings.names else times_alone(names)
+    times = [] if settings.pair == "number" else times_in(texts)
+    are_times = None not in times and all(len(text) > SHORT for text in texts)
     if settings.pair == "number" or (settings.pair is None and not are_times):
         return "number", _numbers_of(files, settings.names)
+    keys = {file: time for file, time in zip(files, times, strict=True) if time is not None}
     for file in files:
-        if file not in times:
+        if file not in keys:
             raise LogError("its name is not a time, so its frame cannot be found", where=file)
-    return "stamp", times
+    return "stamp", keys
 
 
 def _numbers_of(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
@@ -238,7 +242,7 @@ def _numbers_of(files: Mapping[Path, str], pattern: str) -> dict[Path, int]:
             )
     if not digits or max(map(len, digits)) > 18:  # more do not fit into 64 bits
         remedy = Sentence("pair by names, with {truth.images}")
-        raise LogError("its name has no number", where=first, remedy=remedy)
+        raise LogError("its name has no number of a frame", where=first, remedy=remedy)
     return dict(zip(files, map(int, digits), strict=True))
 
 

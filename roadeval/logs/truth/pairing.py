@@ -378,6 +378,10 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
     note = ""
     if clock is Clock.STAMP and isinstance(labels, TopicReader):
         check_clocks(images, labels, offset)
+        ends = {labels.stamp(position) for position in (0, len(labels) - 1) if len(labels)}
+        if ends == {0} and images.stamp(0):
+            clock = Clock.LOG_TIME
+            note = "its stamps are 0, so log times pair it: what was logged late fits no frame"
     elif clock is Clock.STAMP and isinstance(labels, NamedLabels) and len(labels):
         clock, note = _find_clock(images, labels, camera.tolerance_ns, offset)
     if clock is Clock.STAMP:

@@ -31,6 +31,16 @@ def other(name: str) -> TopicInfo:
     return TopicInfo(name, "sensor_msgs/msg/Imu", "cdr", TopicKind.OTHER, 5)
 
 
+def test_a_topic_that_is_named_for_something_else_is_no_camera():
+    topics = [camera("/front/image"), label("/front/road")]
+    with pytest.raises(LogError, match="2 image topics: /front/image, /front/road"):
+        choose_image(topics, None)
+    for settings in (TopicSettings(truth="/front/road"), TopicSettings(masks={"a": "/front/road"})):
+        assert choose_image(topics, None, settings.of_labels)[0].name == "/front/image"
+    with pytest.raises(LogError, match="2 image topics"):
+        choose_image(topics, None, {topic.name for topic in topics})
+
+
 def test_labels_and_masks_are_no_cameras_and_depth_is_one_where_there_is_nothing_else() -> None:
     topics = [camera("/cam"), label("/labels/semantic"), label("/road_mask"), label("/shadowMask")]
     assert choose_image(topics, None)[0].name == "/cam"

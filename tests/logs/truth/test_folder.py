@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
@@ -72,6 +73,54 @@ def test_names_that_are_times_are_stamps(tmp_path):
             "1700000000500000001_gt.png": 1_700_000_000_500_000_001,
         },
     )
+
+
+SECOND = 1_700_000_000
+
+
+@pytest.mark.parametrize("name", ["cam_{}_road", "frame{}", "{}_pred_v2", "cam0-{}.rectified"])
+def test_the_text_around_the_times_is_the_same_in_all_names(tmp_path, name):
+    times = (f"{SECOND + second}.5" for second in range(2))
+    path = folder(tmp_path, *(f"{name.format(time)}.png" for time in times))
+    by, stamps = keys(path)
+    assert (by, [*stamps.values()]) == ("stamp", [SECOND * 10**9 + n * 10**8 for n in (5, 15)])
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("left_1700000000123", "right_1700000001123"),
+        ("drive_1700000000_000001", "drive_1700000000_000002"),
+        ("frame_0000000001", "frame_0000000002"),
+    ],
+)
+def test_a_number_is_not_taken_for_a_time(tmp_path, names):
+    with suppress(LogError):
+        assert keys(folder(tmp_path, *(f"{name}.png" for name in names)))[0] == "number"
+
+
+@pytest.mark.parametrize(
+    ("digits", "nanoseconds"),
+    [
+        (("50000000", "150000000", "0"), (50_000_000, 150_000_000, 0)),
+        (("50000000",), (50_000_000,)),
+        (("50000", "150000"), (50_000_000, 150_000_000)),
+        (("50", "950"), (50_000_000, 950_000_000)),
+        (("5", "25", "125", "0625"), (500_000_000, 250_000_000, 125_000_000, 62_500_000)),
+        (("5000", "2500"), (500_000_000, 250_000_000)),
+        (("051234567", "51234567"), (51_234_567, 512_345_670)),
+    ],
+)
+def test_zeros_before_the_digits_of_a_second_may_be_left_out(tmp_path, digits, nanoseconds):
+    names = [f"{SECOND + place}_{text}.png" for place, text in enumerate(digits)]
+    _, stamps = keys(folder(tmp_path, *names))
+    assert [stamps[name] % 10**9 for name in names] == [*nanoseconds]
+
+
+def test_digits_of_a_second_that_may_be_either_are_refused(tmp_path):
+    path = folder(tmp_path, f"{SECOND}.51234567.png", f"{SECOND}.151234567.png")
+    with pytest.raises(LogError, match=r"may be decimals, or nanoseconds .*; write nine digits"):
+        keys(path)
 
 
 def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
@@ -139,6 +188,29 @@ def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same():
         codes = confidence.codes(picture, Limits())
         np.testing.assert_array_equal(codes, wide)
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
+
+
+def tiff(array):
+    file = io.BytesIO()
+    Image.fromarray(array).save(file, "tiff")
+    return CompressedPicture(0, "tiff", file.getvalue())
+
+
+@pytest.mark.parametrize("read", [lambda array: npy_picture(file_of(array), Limits()), tiff])
+def test_classes_that_are_stored_as_floats_keep_their_numbers(read):
+    classes = np.array([[0, 1, 2, 255], [0, 0, 1, 7]], np.float32)
+    for rows in (classes, classes[:, :2]):  # also where there are only 0 and 1
+        np.testing.assert_array_equal(to_labels(read(rows), Limits()), rows)
+    fractions = np.array([[0, 0.5, 1, 1]], np.float32)
+    assert to_labels(read(fractions), Limits()).tolist() == [[0, 128, 255, 255]]
+    assert Confidence(0.5).codes(read(fractions), Limits()).tolist() == [[0, 32768, 65535, 65535]]
+    assert Confidence(0.5).codes(read(classes[:, :2]), Limits()).max() == 65535
+
+
+def test_rounding_takes_no_confidence_beyond_its_ends():
+    rounded = np.array([[-1e-7, 1.0000001, 0.5]], np.float32)
+    codes = Confidence(0.5).codes(npy_picture(file_of(rounded), Limits()), Limits())
+    assert codes.tolist() == [[0, 65535, 32768]]
 
 
 # --- NPY files as pictures ------------------------------------------------------------------------

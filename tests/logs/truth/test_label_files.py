@@ -153,6 +153,15 @@ def test_another_size_is_refused_or_scaled(drive, tmp_path):
     np.testing.assert_array_equal(frames[3].decode().truth, frames[2].decode().truth)
 
 
+def test_labels_of_a_part_of_the_image_are_not_told_to_be_scaled(drive, tmp_path):
+    names = (f"{number}.png" for number in range(FRAMES))
+    path = images(tmp_path / "truth", *names, pixels=LOWER[16:])
+    assert "another shape: fill labels of a part of the image up to" in str(refusal(drive, path))
+    selection, _, _ = select(drive, path, resize=True)
+    (warning,) = selection.truth.meaning.notes
+    assert warning.startswith("labels of 48x16 are stretched to 48x32, another shape")
+
+
 def test_a_damaged_file_among_many_loses_its_frame(drive, tmp_path):
     path = images(tmp_path / "truth", *(f"{number}.png" for number in range(FRAMES)))
     content = (path / "3.png").read_bytes()

@@ -87,13 +87,20 @@ def test_a_picture_whose_values_mean_something_else_than_those_looked_at_is_no_l
         (LabelSettings(road=("sky",)), "labels.road", "sky does not occur in /labels"),
         (LabelSettings(road=(3,), ignore=("sky",)), "labels.ignore", "sky does not occur in"),
         (LabelSettings(road=(7,)), "labels.road", r"7 does not occur in /labels.* 0 3 11"),
-        (LabelSettings(road=(3,), ignore=(9,)), "labels.ignore", "9 does not occur in /labels"),
+        (LabelSettings(road=(7,), ignore=(9,)), "labels.road", "7 does not occur in /labels"),
     ],
 )
 def test_a_value_that_is_not_named_or_does_not_occur_is_refused(labels, setting, problem) -> None:
     with pytest.raises(LogError, match=problem) as refused:
         truth([0, 3, 11], labels)
     assert refused.value.setting == setting
+
+
+@pytest.mark.parametrize("labels", [LabelSettings((3,), (9,)), LabelSettings((3, 9))])
+def test_a_value_beside_road_may_be_rare_and_is_told(labels) -> None:
+    table = find_meaning(labels, [[0, 3, 11], [3]], "/labels")
+    assert table.notes == ("no label that was looked at holds 9: is it rare?",)
+    assert table.meaning[9] == (1 if 9 in labels.road else 255)
 
 
 NO_NAMES = "its keys must all be values, or all colours"
@@ -151,6 +158,21 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     labels = LabelSettings(road_colors=(ROAD,))
     table = find_meaning(labels, [count_values(picture, labels, "/labels", LIMITS)], "/labels")
     assert table.read(picture, LIMITS).truth.tolist() == [[0, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("palette", "values"),
+    [
+        ([0, 0, 0, 255, 255, 255, *CAR], [0, 1]),  # as the images in which there is a car
+        ([255, 255, 255, 0, 0, 0], [255, 0]),
+        ([255, 255, 255], [255]),  # road everywhere
+    ],
+)
+def test_a_palette_means_the_same_whichever_of_its_colours_an_image_has(palette, values) -> None:
+    for index, value in enumerate(values):
+        assert to_labels(palette_png([[index, 0]], palette), LIMITS).tolist() == [
+            [value, values[0]]
+        ]
 
 
 @pytest.mark.parametrize("labels", [LabelSettings(), LabelSettings(road=(255,))])
