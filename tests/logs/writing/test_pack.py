@@ -164,6 +164,7 @@ def film(path: Path, rate: int, count: int) -> Path:
         except av.FFmpegError:
             pytest.skip("PyAV was built without libx264")
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.options = {"preset": "veryfast", "x264-params": "b-adapt=0"}
         for number in range(count):
             image = np.full((48, 64, 3), 8 * number, np.uint8)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
@@ -189,6 +190,17 @@ def test_a_video_is_packed_frame_by_frame_and_read_by_foxgloves_decoder(
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         times = [m.timestamp.ToNanoseconds() for *_, m in reader.iter_decoded_messages()]
     assert times == [40_000_000 * i for i in range(count)]
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".mkv", ".ts", ".mpg"])
+def test_frames_of_a_video_are_in_the_order_in_which_they_are_shown(tmp_path, suffix):
+    """An AVI with B-frames has times in the order of decoding, an MPEG times of some frames."""
+    packed = pack(film(tmp_path / f"film{suffix}", 25, 30), tmp_path / "film.mcap")
+    with open_log(packed.path) as log:
+        read = [frame.decode() for frame in log.frames(log.select())]
+    levels = [frame.image.mean() for frame in read]
+    np.testing.assert_allclose(levels, [8 * number for number in range(30)], atol=4)
+    np.testing.assert_allclose([f.stamp_ns / 1e6 for f in read], np.arange(30) * 40, atol=1)
 
 
 @pytest.mark.parametrize("labels", ["labels/a.json", "labels", "images"])
