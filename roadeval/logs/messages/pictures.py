@@ -334,6 +334,20 @@ class Video:
                     return candidate
         return position
 
+    def parameters(self, position: int) -> tuple[int, bytes]:
+        """Return where the parameters of a keyframe are, and those it lacks: some are sent once."""
+        codec, units = codec_of(self._packets.picture(position)), b""
+        near = range(position, max(position - 3000, -1), -1)
+        for candidate in chain(near, range(min(PATIENCE, position), -1, -1)):
+            if codec not in _PARAMETERS:
+                break
+            with suppress(FrameError):
+                data = bytes(self._packets.picture(candidate).data)
+                units = b"".join(_PARAMETER_UNITS[codec].findall(data)) + units
+                if _PARAMETERS[codec].search(data):
+                    return candidate, units if candidate < position else b""
+        return position, b""
+
     @cached_property
     def _counted(self) -> bool:
         """Whether the packets are numbered one by one, as the first ones show."""
@@ -375,7 +389,7 @@ class Video:
                     raise FrameError(broken)
                 data = bytes(packet.data)
                 if decoder is None:
-                    decoder, data = self._decoder(packet), self._parameters(position) + data
+                    decoder, data = self._decoder(packet), self.parameters(position)[1] + data
                     numbers.is_gap(data)
                 self._waiting[position] = packet
                 unit = self._av.Packet(data)
@@ -389,20 +403,6 @@ class Video:
             with suppress(BadMessage):
                 self._take(decoder, None)
         yield True
-
-    def _parameters(self, position: int) -> bytes:
-        """Return the last parameters before a keyframe that has none itself."""
-        codec, units = codec_of(self._packets.picture(position)), b""
-        if codec not in _PARAMETERS:
-            return b""
-        near = range(position, max(position - 3000, -1), -1)
-        for candidate in chain(near, range(min(PATIENCE, position), -1, -1)):
-            with suppress(FrameError):
-                data = bytes(self._packets.picture(candidate).data)
-                units = b"".join(_PARAMETER_UNITS[codec].findall(data)) + units
-                if _PARAMETERS[codec].search(data):
-                    return units if candidate < position else b""
-        return b""
 
     def _decoder(self, packet: Picture) -> Any:
         codec = codec_of(packet)

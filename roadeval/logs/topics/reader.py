@@ -371,7 +371,10 @@ class TopicReader:
         elif kind in (TopicKind.CALIBRATION, TopicKind.CLASSES):
             yield from range(max(low - 1, 0), low)
         elif kind is TopicKind.VIDEO and low < high:
-            low = pictures.Video(self, self.limits).keyframe(low)
+            video = pictures.Video(self, self.limits)
+            low = video.keyframe(low)
+            with suppress(FrameError):
+                yield from {video.parameters(low)[0]} - {low}
         latest = np.searchsorted(self.log_times, end + 10 * NS) if kind in PICTURES else high
         while high < latest and self.stamp(0) < self.stamp(high) <= stamp:
             high += 1

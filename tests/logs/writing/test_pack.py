@@ -35,6 +35,7 @@ from roadeval.logs.writing.writer import LogWriter, SidecarWriter, pack
 from tests.fixtures.make import make
 from tests.fixtures.shared import shared
 from tests.logs.making import COMPRESSED, SECOND, compressed, grey, jpeg, png, ros2_log
+from tests.logs.messages.test_decoders import KEYED, MOVING, encoded, without_parameters
 
 HALF_SECOND = 500_000_000
 
@@ -445,3 +446,17 @@ def test_the_video_of_an_excerpt_begins_at_a_keyframe(tmp_path):
     assert len(messages_in(tmp_path / "part.mcap")) == 5
     with open_log(tmp_path / "part.mcap") as part:
         assert [frame.decode().number for frame in part.frames(part.select())] == [*range(5)]
+
+
+def test_an_excerpt_has_the_parameters_of_a_video_that_were_sent_once(tmp_path):
+    video = encoded(MOVING, 0, KEYED)
+    packets = [video[0][1], *(without_parameters(data) for _, data in video[1:])]
+    messages = [
+        ("/camera", at * SECOND, compressed(at * SECOND, data, "h264"))
+        for at, data in enumerate(packets, 1)
+    ]
+    with open_log(ros2_log(tmp_path / "a.mcap", messages), every_topic=True) as log:
+        log.write_excerpt("/camera", 25, 26, tmp_path / "part.mcap")
+    with open_log(tmp_path / "part.mcap") as part:
+        read = [frame.decode().stamp_ns // SECOND for frame in part.frames(part.select())]
+    assert read == [1, *range(21, 28)]
