@@ -232,7 +232,8 @@ def settle(
             shown = "shadow" if name == SHADOW else "road"
             names = class_names(reader.name, topics, readers) if is_truth else {}
             meaning = meaning_of(reader, values, shown=shown, names=names)
-            labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason)
+            notes = (pairing.note,) if pairing.note else ()
+            labels[name] = LabelSource(reader.name, reader, meaning, pairing, reason, notes=notes)
     calibration = calibration_of(image, topics, readers)
     if any(calibration) and image.turned != 1 and camera.images.limits.turn:
         reason = "it is of the sensor's rows, and the images are turned ({frames.unturned})"

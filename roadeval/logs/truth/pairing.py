@@ -377,6 +377,9 @@ def by_time(labels: LabelPictures, camera: Camera, offset_ms: float = 0.0) -> Pa
     images, clock, offset = camera.images, camera.clock, round(offset_ms * 1e6)
     note = ""
     if clock is Clock.STAMP and isinstance(labels, TopicReader):
+        first = range(min(LOOKED_AT, len(labels)))
+        if first and images.stamp(0) and not any(map(labels.stamp, first)):
+            clock, note = Clock.LOG_TIME, "its header stamps are zero: log times pair it"
         check_clocks(images, labels, offset)
     elif clock is Clock.STAMP and isinstance(labels, NamedLabels) and len(labels):
         clock, note = _find_clock(images, labels, camera.tolerance_ns, offset)
