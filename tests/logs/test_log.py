@@ -57,6 +57,21 @@ def test_a_topic_is_not_scored_against_itself(
     assert (refused.value.where, refused.value.setting) == ("drive.mcap", setting)
 
 
+@pytest.mark.parametrize(("first", "labelled"), [(START, 10), (0, 1)])
+def test_labels_with_zero_stamps_are_paired_by_log_times(tmp_path, first, labelled):
+    """A camera whose own stamps begin at zero may have one label, of its first image."""
+    mask = np.vstack([grey(0, height=3), grey(255, height=3)])
+    messages: list[tuple[str, int, Any]] = []
+    for number, logged in enumerate(STAMPS):
+        messages.append(("/camera", logged, compressed(first + number, jpeg(grey(99)))))
+        messages.append(("/labels", logged + 7, raw(0, mask, "mono8")))
+    messages = messages if first else [*messages[::2], messages[1]]
+    path = ros2_log(tmp_path / "drive.mcap", sorted(messages, key=lambda message: message[1]))
+    selection, frames = read(path, topics=TopicSettings(sync_tolerance_ms=0 if not first else None))
+    assert [frame.labelled for frame in frames] == [True] * labelled + [False] * (10 - labelled)
+    assert bool(selection.truth.notes) == bool(first)
+
+
 @pytest.mark.parametrize(
     ("frames", "numbers"),
     [

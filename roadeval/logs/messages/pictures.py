@@ -256,6 +256,13 @@ _PARAMETERS: Final = {
     "hevc": re.compile(rb"\x00\x00\x01[\x42\x43]"),
 }
 """Heads of sequence parameters, which some encoders send in a separate packet."""
+_PARAMETER_UNITS: Final = {
+    "h264": re.compile(
+        rb"\x00\x00\x01[\x07\x08\x27\x28\x47\x48\x67\x68].*?(?=\x00\x00\x01|\Z)", re.DOTALL
+    ),
+    "hevc": re.compile(rb"\x00\x00\x01[\x40-\x45].*?(?=\x00\x00\x01|\Z)", re.DOTALL),
+}
+"""All parameters, which some encoders send once, at the beginning."""
 
 
 class PictureSequence(Protocol):
@@ -292,13 +299,16 @@ class Video:
 
         A `FrameError` if it, or a frame that it depends on, cannot be decoded.
         """
-        if position not in self._ready and not 0 <= position - self._next <= PATIENCE:
+        is_near = position in self._waiting or 0 <= position - self._next <= PATIENCE
+        if position not in self._ready and not is_near:
             keyframe = self.keyframe(position)
             if position < self._next or keyframe > self._next:
                 self._begin(keyframe)
-        while position not in self._ready and self._next <= position + PATIENCE:
-            if not next(self._steps, False):
-                break
+        self._advance(position)
+        if position not in self._ready and 0 < self._first == self.keyframe(position):
+            # Frames of an open group, or of an intra refresh, build upon the group before.
+            self._begin(self.keyframe(self._first - 1))
+            self._advance(position)
         frame = self._ready.pop(position, FrameError("the decoder gave no picture for it"))
         self._ready = {at: outcome for at, outcome in self._ready.items() if at > position}
         if isinstance(frame, FrameError):
@@ -306,8 +316,15 @@ class Video:
         return frame
 
     def _begin(self, position: int) -> None:
-        self._next, self._damaged, self._ready = position, False, {}
+        self._first = self._next = position
+        self._damaged, self._ready, self._waiting = False, {}, dict[int, Picture]()
         self._shown, self._steps = (position, 0), self._decode(position)
+
+    def _advance(self, position: int) -> None:
+        """Decode until a frame is ready, or the decoder will not give it any more."""
+        while position not in self._ready and self._next <= position + PATIENCE:
+            if not next(self._steps, False):
+                break
 
     def keyframe(self, position: int) -> int:
         """Return the position of the last keyframe at or before ``position``."""
@@ -316,6 +333,20 @@ class Video:
                 if is_keyframe(self._packets.picture(candidate)):
                     return candidate
         return position
+
+    def parameters(self, position: int) -> tuple[int, bytes]:
+        """Return where the parameters of a keyframe are, and those it lacks: some are sent once."""
+        codec, units = codec_of(self._packets.picture(position)), b""
+        near = range(position, max(position - 3000, -1), -1)
+        for candidate in chain(near, range(min(PATIENCE, position), -1, -1)):
+            if codec not in _PARAMETERS:
+                break
+            with suppress(FrameError):
+                data = bytes(self._packets.picture(candidate).data)
+                units = b"".join(_PARAMETER_UNITS[codec].findall(data)) + units
+                if _PARAMETERS[codec].search(data):
+                    return candidate, units if candidate < position else b""
+        return position, b""
 
     @cached_property
     def _counted(self) -> bool:
@@ -337,14 +368,18 @@ class Video:
     def _decode(self, begin: int) -> Iterator[bool]:
         """Decode from a keyframe on, one packet at each step; the frames go to ``_ready``."""
         decoder: Any = None
-        last, numbers = None, FrameNumbers()
-        waiting, broken = dict[int, Picture](), ""
+        last, numbers, broken = None, FrameNumbers(), ""
         for position in range(begin, len(self._packets)):
             self._next = position + 1
             try:
                 packet = self._packets.picture(position)
                 follows, last = self._follows(packet, last, numbers), packet
                 if is_keyframe(packet):
+                    if decoder is not None and (broken or not follows):
+                        # Frames of an open group may build upon lost ones before the keyframe.
+                        with suppress(BadMessage):
+                            self._take(decoder, None)
+                        decoder = None
                     broken = ""
                 elif decoder is None:
                     broken = "the video has no keyframe before it"
@@ -352,18 +387,21 @@ class Video:
                     broken = broken or LOST
                 if broken:
                     raise FrameError(broken)
-                decoder = decoder or self._decoder(packet)
-                waiting[position] = packet
-                unit = self._av.Packet(bytes(packet.data))
+                data = bytes(packet.data)
+                if decoder is None:
+                    decoder, data = self._decoder(packet), self.parameters(position)[1] + data
+                    numbers.is_gap(data)
+                self._waiting[position] = packet
+                unit = self._av.Packet(data)
                 unit.pts = unit.dts = position
-                self._take(decoder, unit, waiting)
+                self._take(decoder, unit)
             except (BadMessage, FrameError) as error:
                 self._ready[position] = FrameError.of(error)
                 broken = broken or LOST
             yield True
         if decoder is not None:
             with suppress(BadMessage):
-                self._take(decoder, None, waiting)
+                self._take(decoder, None)
         yield True
 
     def _decoder(self, packet: Picture) -> Any:
@@ -375,7 +413,7 @@ class Video:
         decoder.options = {"max_pixels": str(self._limits.max_pixels)}
         return decoder
 
-    def _take(self, decoder: Any, unit: Any, waiting: dict[int, Picture]) -> None:
+    def _take(self, decoder: Any, unit: Any) -> None:
         """Decode a packet, or empty the decoder, and take the frames that come out."""
         try:
             frames = decoder.decode(unit)
@@ -384,7 +422,7 @@ class Video:
         for frame in frames:
             # The decoder fills in damaged parts.
             self._damaged = frame.is_corrupt or (self._damaged and not frame.key_frame)
-            packet = waiting.pop(frame.pts, None)
+            packet = self._waiting.pop(frame.pts, None)
             if packet is not None and self._damaged:
                 what = "its video" if frame.is_corrupt else "a frame that it builds upon"
                 self._ready[frame.pts] = FrameError(f"{what} is damaged")

@@ -171,7 +171,13 @@ def _lens_in(topic: str, message: Any, image: TopicInfo) -> LensAndNote:
         if lens.bends and np.array_equal(flat.matrix, lens.matrix):
             note = "the images are taken as not rectified: P is K, and there is distortion"
         elif any(p):
-            lens = flat
+            lens, turn = flat, np.reshape(numbers("r") if any(numbers("r")) else np.eye(3), (3, 3))
+            if (angle := np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))) > 0.1:
+                turned = (
+                    "its R turns rectified images by {}\N{DEGREE SIGN}, and is not used: {} is "
+                )
+                turned += "taken as the frame of the rectified camera, as stereo_image_proc does"
+                note = Sentence(turned, f"{angle:.1f}", frame)
     if lens.problem:
         return None, f"its {lens.problem}"
     fitting, remark = _fit_to_size(lens, message, image.size or size)

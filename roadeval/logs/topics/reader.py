@@ -133,9 +133,12 @@ def _describe_picture(reader: TopicReader, position: int) -> dict[str, Any]:
         kind, name, size = TopicKind.IMAGE, picture.encoding, (picture.width, picture.height)
         channels = 1 if raw_format(picture, reader.limits).is_grey else 3
     elif name := pictures.codec_of(picture) or "":
-        with suppress(FrameError, LogError):  # the first frame may not be decodable
-            first = pictures.Video(reader, reader.limits).picture(0)
-            size, turned = first.pixels.shape[1::-1], first.turned
+        video = pictures.Video(reader, reader.limits)
+        for at in range(min(len(reader), 300)):  # a log may begin between keyframes
+            with suppress(FrameError, LogError):
+                first = video.picture(at)
+                size, turned = first.pixels.shape[1::-1], first.turned
+                break
     else:
         pixels, turned = to_labels(picture, reader.limits), orientation_of(picture.data)
         kind, name, size = TopicKind.COMPRESSED, picture.format, pixels.shape[1::-1]
@@ -368,7 +371,10 @@ class TopicReader:
         elif kind in (TopicKind.CALIBRATION, TopicKind.CLASSES):
             yield from range(max(low - 1, 0), low)
         elif kind is TopicKind.VIDEO and low < high:
-            low = pictures.Video(self, self.limits).keyframe(low)
+            video = pictures.Video(self, self.limits)
+            low = video.keyframe(low)
+            with suppress(FrameError):
+                yield from {video.parameters(low)[0]} - {low}
         latest = np.searchsorted(self.log_times, end + 10 * NS) if kind in PICTURES else high
         while high < latest and self.stamp(0) < self.stamp(high) <= stamp:
             high += 1

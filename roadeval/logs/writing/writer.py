@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from itertools import count
+from heapq import heappop, heappush
+from itertools import chain, count, repeat
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -237,6 +239,8 @@ def _metrics_schema(rates: tuple[str, ...]) -> Schema:
 
 CAMERA: Final = "/camera/image"
 TRUTH: Final = "/truth/road"
+REORDERED: Final = 16
+"""Frames of a video among which their times may be in another order."""
 VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
 
 
@@ -361,8 +365,9 @@ def _list_labels(masks: Path, images: Path) -> Sequence[Path]:
 def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, bytes]]:
     """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
 
-    Adds to the ``orientations`` from which frames are turned. A `LogError` if it cannot be read, or
-    holds no video.
+    Frames are in the order in which they are shown, and so are their times: those of an AVI with
+    B-frames are in the order of decoding. Adds to the ``orientations`` from which frames are
+    turned. A `LogError` if the video cannot be read, or holds no video.
     """
     import av
     import cv2
@@ -372,15 +377,22 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
             if not container.streams.video:
                 raise LogError("it holds no video", where=video)
             stream = container.streams.video[0]
-            first: int | None = None
-            for index, frame in enumerate(container.decode(stream)):
-                pts = index if frame.pts is None else frame.pts
-                first = pts if first is None else first
-                unit = stream.time_base or Fraction(1, 25)
-                orientations.add(orientation := turn_of(frame))
-                bgr = upright(frame.to_ndarray(format="bgr24"), orientation)
-                _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, 95])
-                yield round((pts - first) * unit * NS), jpeg.tobytes()
+            times, jpegs, first = list[int](), deque[bytes](), None
+            unit = stream.time_base or Fraction(1, 25)
+            step = round(1 / (stream.average_rate or 25) / unit)
+            last = -step
+            for frame in chain(container.decode(stream), repeat(None, REORDERED)):
+                if frame is not None:
+                    last = last + step if frame.pts is None else frame.pts
+                    heappush(times, last)
+                    orientations.add(orientation := turn_of(frame))
+                    bgr = upright(frame.to_ndarray(format="bgr24"), orientation)
+                    _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, 95])
+                    jpegs.append(jpeg.tobytes())
+                if jpegs and (frame is None or len(jpegs) > REORDERED):
+                    pts = heappop(times)
+                    first = pts if first is None else first
+                    yield round((pts - first) * unit * NS), jpegs.popleft()
     except (av.FFmpegError, OSError) as error:
         raise LogError(f"not a readable video ({error.strerror})", where=video) from error
 

@@ -421,7 +421,7 @@ def test_a_video_of_too_many_pixels_is_not_decoded(log: Path) -> None:
         next(opened.frames(opened.select())).decode()
 
 
-def encoded(pictures: list[np.ndarray], bf: int) -> list[tuple[int, bytes]]:
+def encoded(pictures: list[np.ndarray], bf: int, more: str = "") -> list[tuple[int, bytes]]:
     """Encode planes of luma nearly without loss, ``bf`` B-frames in a row: places and packets."""
     import av
 
@@ -429,7 +429,7 @@ def encoded(pictures: list[np.ndarray], bf: int) -> list[tuple[int, bytes]]:
     encoder.height, encoder.width = pictures[0].shape
     encoder.pix_fmt, encoder.framerate, encoder.time_base = "yuv420p", 10, Fraction(1, 10)
     encoder.max_b_frames = bf
-    encoder.options = {"x264-params": "qp=1:scenecut=0:b-adapt=0"}
+    encoder.options = {"x264-params": f"qp=1:scenecut=0:b-adapt=0{more}"}
     packets = []
     for number, luma in enumerate(pictures):
         grey = np.full((luma.shape[0] // 2, luma.shape[1]), 128, np.uint8)
@@ -484,6 +484,55 @@ def test_labels_with_numbers_are_those_of_b_frames_as_they_are_shown(tmp_path: P
         by_number = {frame.number: frame for frame in log.frames(log.select())}
         numbers = [Path(by_number[n].labels["/truth"].place).stem for n in range(10)]
     assert [int(number) for number in numbers] == [place for place, _ in video]
+
+
+KEYED = ":keyint=10:min-keyint=10"
+PATTERN = np.random.default_rng(0).integers(40, 200, (6, 40), np.uint8).repeat(8, 0).repeat(8, 1)
+MOVING = [np.ascontiguousarray(PATTERN[:, 6 * n : 6 * n + 64]) for n in range(40)]
+
+
+def without_parameters(data: bytes) -> bytes:
+    """Return a packet of H.264 without its parameters."""
+    return re.sub(rb"\x00\x00\x01[\x67\x68].*?(?=\x00\x00\x01|\Z)", b"", data, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("once", [False, True])
+@pytest.mark.parametrize(
+    ("bf", "more"),
+    [(0, KEYED), (3, KEYED), (3, KEYED + ":open-gop=1"), (0, KEYED + ":intra-refresh=1")],
+)
+def test_a_frame_does_not_depend_on_where_reading_begins(bf: int, more: str, once: bool) -> None:
+    video = encoded(MOVING, bf, more)
+    if once:
+        video[1:] = [(place, without_parameters(data)) for place, data in video[1:]]
+    packets = stamped(video)
+    in_order = Video(packets, Limits())
+    for position, (place, _) in enumerate(video):
+        for reading in (in_order, Video(packets, Limits())):
+            luma = reading.picture(position).pixels[..., 1]
+            shown = np.clip((MOVING[place].astype(int) - 16) * 255 / 219, 0, 255)
+            assert np.abs(luma - shown).mean() < 5
+
+
+@pytest.mark.parametrize("lost", range(1, 30))
+def test_frames_of_an_open_group_are_not_built_upon_a_lost_frame(lost: int) -> None:
+    video = encoded(MOVING, 3, KEYED + ":open-gop=1")
+    packets, frames_read = stamped(video), 0
+    packets.lost = [lost]
+    reading = Video(packets, Limits())
+    for position, (place, _) in enumerate(video):
+        with suppress(FrameError):
+            luma, frames_read = reading.picture(position).pixels[..., 1], frames_read + 1
+            shown = np.clip((MOVING[place].astype(int) - 16) * 255 / 219, 0, 255)
+            assert np.abs(luma - shown).mean() < 5
+    assert frames_read >= 25
+
+
+def test_the_size_of_a_video_that_begins_between_keyframes(tmp_path: Path) -> None:
+    video = encoded(MOVING, 0, KEYED)[4:]
+    messages = [("/camera", at, compressed(at, data, "h264")) for at, (_, data) in enumerate(video)]
+    with open_log(ros2_log(tmp_path / "a.mcap", messages)) as log:
+        assert log.topics[0].size == (64, 48)
 
 
 @pytest.mark.parametrize("full_range", [False, True])

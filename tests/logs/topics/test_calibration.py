@@ -340,6 +340,14 @@ def test_names_and_numbers_tell_whether_images_are_rectified(tmp_path, topic, fi
     assert ("taken as not rectified" in why) == (fields.get("p") == SAME and bends)
 
 
+@pytest.mark.parametrize(("degrees", "topic"), [(2.5, "rect"), (0.0, "rect"), (2.5, "raw")])
+def test_a_rotation_that_rectifies_is_said_not_to_be_used(tmp_path, degrees, topic):
+    turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix().ravel().tolist()
+    _, why = front(tmp_path, topic=f"/front/image_{topic}", p=P, r=turn)
+    said = "its R turns rectified images by 2.5°, and is not used: cam is taken as the frame of"
+    assert (said in why) == (degrees > 0 and topic == "rect")
+
+
 def test_rectified_images_without_a_projection_have_no_lens(tmp_path: Path):
     why = "its projection P is zero, and the images are rectified: give its lens with `ground`"
     assert front(tmp_path, topic="/front/image_rect") == (None, f"/front/info: {why}")

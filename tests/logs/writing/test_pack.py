@@ -35,6 +35,7 @@ from roadeval.logs.writing.writer import LogWriter, SidecarWriter, pack
 from tests.fixtures.make import make
 from tests.fixtures.shared import shared
 from tests.logs.making import COMPRESSED, SECOND, compressed, grey, jpeg, png, ros2_log
+from tests.logs.messages.test_decoders import KEYED, MOVING, encoded, without_parameters
 
 HALF_SECOND = 500_000_000
 
@@ -164,6 +165,7 @@ def film(path: Path, rate: int, count: int) -> Path:
         except av.FFmpegError:
             pytest.skip("PyAV was built without libx264")
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.options = {"preset": "veryfast", "x264-params": "b-adapt=0"}
         for number in range(count):
             image = np.full((48, 64, 3), 8 * number, np.uint8)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
@@ -189,6 +191,17 @@ def test_a_video_is_packed_frame_by_frame_and_read_by_foxgloves_decoder(
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         times = [m.timestamp.ToNanoseconds() for *_, m in reader.iter_decoded_messages()]
     assert times == [40_000_000 * i for i in range(count)]
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".mkv", ".ts", ".mpg"])
+def test_frames_of_a_video_are_in_the_order_in_which_they_are_shown(tmp_path, suffix):
+    """An AVI with B-frames has times in the order of decoding, an MPEG times of some frames."""
+    packed = pack(film(tmp_path / f"film{suffix}", 25, 30), tmp_path / "film.mcap")
+    with open_log(packed.path) as log:
+        read = [frame.decode() for frame in log.frames(log.select())]
+    levels = [frame.image.mean() for frame in read]
+    np.testing.assert_allclose(levels, [8 * number for number in range(30)], atol=4)
+    np.testing.assert_allclose([f.stamp_ns / 1e6 for f in read], np.arange(30) * 40, atol=1)
 
 
 @pytest.mark.parametrize("labels", ["labels/a.json", "labels", "images"])
@@ -433,3 +446,17 @@ def test_the_video_of_an_excerpt_begins_at_a_keyframe(tmp_path):
     assert len(messages_in(tmp_path / "part.mcap")) == 5
     with open_log(tmp_path / "part.mcap") as part:
         assert [frame.decode().number for frame in part.frames(part.select())] == [*range(5)]
+
+
+def test_an_excerpt_has_the_parameters_of_a_video_that_were_sent_once(tmp_path):
+    video = encoded(MOVING, 0, KEYED)
+    packets = [video[0][1], *(without_parameters(data) for _, data in video[1:])]
+    messages = [
+        ("/camera", at * SECOND, compressed(at * SECOND, data, "h264"))
+        for at, data in enumerate(packets, 1)
+    ]
+    with open_log(ros2_log(tmp_path / "a.mcap", messages), every_topic=True) as log:
+        log.write_excerpt("/camera", 25, 26, tmp_path / "part.mcap")
+    with open_log(tmp_path / "part.mcap") as part:
+        read = [frame.decode().stamp_ns // SECOND for frame in part.frames(part.select())]
+    assert read == [1, *range(21, 28)]
