@@ -304,6 +304,11 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
         for share, where in ((0, "nowhere"), (1, "everywhere")):
             if variant != BASELINE and total["pooled_TPR"] == total["pooled_FPR"] == share:
                 yield f"{variant}: its final mask is road {where}, on every frame"
+    finals = [[*stages.values()][-1] for stages in totals.values()]
+    for where, counts in (("nowhere", ("TP", "FN")), ("everywhere", ("TN", "FP"))):
+        is_seen = any(total[count] for total in finals for count in counts)
+        if not is_seen and any(total["N"] for total in finals):
+            yield f"the truth is road {where}, on every frame that is scored: are labels read right?"
     yield from run.model.warnings
 
 
