@@ -73,7 +73,7 @@ def import_stage(name: str) -> Stage:
         return guard(replace(stage, about=about, code=origin["sha256"]))
     except UnknownStageError:
         raise
-    except Exception as error:  # a module from outside may raise anything
+    except (Exception, SystemExit) as error:  # a module from outside may raise anything
         raise UnknownStageError(f"stage {name!r} cannot be used: {one_line(error)}") from error
 
 
@@ -159,7 +159,7 @@ def guard(stage: Stage) -> Stage:
                 return work(*arguments)
             except (RoadevalError, MemoryError):
                 raise
-            except Exception as error:  # code from outside may raise anything
+            except (Exception, SystemExit) as error:  # code from outside may raise anything
                 message = f"{one_line(error)}{_place(error)}"
                 raise StageError(f"stage {stage.name} {problem}: {message}") from error
 
@@ -186,7 +186,7 @@ def guard(stage: Stage) -> Stage:
     return replace(stage, bind=bind, fit=fit, adapt=adapt, oracle=oracle)
 
 
-def _place(error: Exception) -> str:
+def _place(error: BaseException) -> str:
     """Return file and line of an error in code from outside, as `` (mine.py:12)``; else nothing."""
     lines = traceback.extract_tb(error.__traceback__)
     outside = [line for line in lines if PACKAGE not in Path(line.filename).parents]

@@ -69,6 +69,10 @@ def always_fails(image):
     raise KeyError("weights")
 
 
+def leaves(image):
+    raise SystemExit(0)
+
+
 def wrong_size(image):
     return np.zeros((2, 2))
 

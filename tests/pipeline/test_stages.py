@@ -84,6 +84,7 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
     ("name", "message"),
     [
         ("wrong_size", r"its mask is \(2, 2\)"),
+        ("leaves", r"leaves failed: SystemExit: 0 \(somebody.py:"),
         ("levels_of_grey", "no mask of 0 and one other level"),
         ("minus_one_elsewhere", "no mask of 0 and one other level"),
         ("LAYERS", "a layer 'level' that its stage does not"),
@@ -102,6 +103,7 @@ def test_an_output_that_cannot_be_is_an_error(name, message):
         (somebodys("Callable"), "neither a Stage nor a function"),
         (somebodys("TAKEN"), "'svm' is that of a stage of roadeval"),
         (somebodys("UNNAMEABLE"), "must be of letters, digits"),
+        ("tests.pipeline.ending:road", "cannot be used: SystemExit: 0"),
         ("no_such_module:road", "there is no module no_such_module: install it"),
         ("pickle:loads", "its argument data is none of image"),
         ("blur", "there is no stage 'blur'; choose"),
