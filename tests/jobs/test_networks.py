@@ -123,7 +123,7 @@ def test_a_notebook_runs_a_network_on_an_image(folder):
 )
 def test_a_notebooks_image_has_three_channels_of_eight_bits_which_come_last(folder, image):
     config = with_network(folder / "red.onnx")
-    with pytest.raises(roadeval.RoadevalError, match="the image is .*, not uint8"):
+    with pytest.raises(roadeval.RoadevalError, match="not uint8"):
         roadeval.run_frame(image, None, config, variant="mine")
 
 
