@@ -17,8 +17,8 @@ GRACE_S: Final = 0.05
 another to its group."""
 
 
-class Stopped(SystemExit):
-    """A request of the user or the system to stop."""
+class Stopped(BaseException):
+    """A request of the user or the system to stop; code from outside may raise `SystemExit`."""
 
     def __init__(self, exit_code: ExitCode) -> None:
         super().__init__(int(exit_code))

@@ -269,7 +269,10 @@ class RunConfig(LogConfig):
                 methods = {*pipelines, *masks} - {FILTERED, UNFILTERED}
                 remedy = f"{likely(name, methods)}choose {list_names(methods)}"
                 raise ConfigError(f"there is no method {name}", setting="tunes", remedy=remedy)
-            variants.append(tuned_variant(name, pipelines.get(name)))
+            variants.append(tuned := tuned_variant(name, pipelines.get(name)))
+            earlier = pipelines.get(tuned.name, tuned.pipeline)
+            if earlier.chain != tuned.pipeline.chain:  # not the same of a run that is repeated
+                check_variant_name(tuned.name, pipelines)
         return self.with_variants(variants)
 
     def input_masks(self) -> set[str]:

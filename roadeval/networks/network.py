@@ -512,6 +512,14 @@ def complete_output(
             f"all classes of its output {name!r} are road",
             Sentence("name at least one that is not (see {net.road} and {net.decide})"),
         )
+    if count == 1 and settings.activation is None and 0 <= sample.low < sample.high > 1 + SLACK:
+        raise file.question(
+            f"its output {name!r} has numbers from {sample.low:.3g} to {sample.high:.3g} on test "
+            "images: no probabilities, and as logits they would call every pixel road",
+            Sentence("end it with values from 0 to 1, or say what they are by {net.activation}"),
+            'activation = ?  # "sigmoid" if these are logits',
+            settings,
+        )
     return replace(
         settings,
         road=road,

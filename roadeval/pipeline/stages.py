@@ -73,7 +73,7 @@ def import_stage(name: str) -> Stage:
         return guard(replace(stage, about=about, code=origin["sha256"]))
     except UnknownStageError:
         raise
-    except Exception as error:  # a module from outside may raise anything
+    except (Exception, SystemExit) as error:  # a module from outside may raise anything
         raise UnknownStageError(f"stage {name!r} cannot be used: {one_line(error)}") from error
 
 
@@ -111,8 +111,8 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     A `TypeError` if it has other arguments. The function's arguments are passed by name: ``image``,
     ``(H, W, 3)`` uint8 RGB; ``moment``, a `roadeval.data.Moment`, or None for an image by itself;
     and ``settings``, whose default is an instance of a dataclass. It returns ``(H, W)`` bool or
-    integers, nonzero for road; or floats from 0 to 1, the probability of road, which is road above
-    one half.
+    integers, 0 and one level for road; or floats from 0 to 1, the probability of road, which is
+    road above one half.
     """
     arguments = inspect.signature(function).parameters
     for argument, about in arguments.items():
@@ -129,16 +129,19 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     @per_view
     def bind(settings: Any, _learnt: None, view: View) -> Output:
         """Call the function, and return its mask as an output."""
-        values = {"image": view.image, "moment": view.moment, "settings": settings}
+        values = {"image": view.image.copy(), "moment": view.moment, "settings": settings}
         array = np.asarray(function(**{key: values[key] for key in values if key in arguments}))
         codes = None
-        if array.ndim != 2:
+        if array.ndim != 2 or array.dtype.kind not in "biuf":
             raise ValueError(f"it returned {array.dtype} {array.shape}, not an (H, W) mask")
         if array.dtype.kind == "f":
             if not ((array >= 0) & (array <= 1)).all():
                 raise ValueError("it returned floats that are no probabilities, from 0 to 1")
-            codes = np.rint(array * CERTAIN).astype(np.uint16)
+            product = np.multiply(array, CERTAIN, dtype=np.result_type(array, np.float32))
+            codes = np.rint(product).astype(np.uint16)  # float16 does not hold 65535
             array = codes > round(CERTAIN / 2)
+        elif array.size and not np.isin(array, (0, max(array.max(), 1))).all():
+            raise ValueError("it returned whole numbers that are no mask of 0 and one other level")
         mask = Packed.of(array != 0)
         return Output((Layer(spec, mask),), mask=mask, probability=codes)
 
@@ -156,7 +159,7 @@ def guard(stage: Stage) -> Stage:
                 return work(*arguments)
             except (RoadevalError, MemoryError):
                 raise
-            except Exception as error:  # code from outside may raise anything
+            except (Exception, SystemExit) as error:  # code from outside may raise anything
                 message = f"{one_line(error)}{_place(error)}"
                 raise StageError(f"stage {stage.name} {problem}: {message}") from error
 
@@ -167,7 +170,10 @@ def guard(stage: Stage) -> Stage:
         run, specs = stage.bind(settings, parameters), stage.specs(settings)
 
         def run_checked(view: View) -> Output:
-            output = run(view)
+            locked = {name: getattr(view, name).view() for name in ("original", "image")}
+            for image in locked.values():
+                image.flags.writeable = False  # the other variants see it, too
+            output = run(replace(view, **locked))
             check_output(output, view, stage, specs)
             return output
 
@@ -180,7 +186,7 @@ def guard(stage: Stage) -> Stage:
     return replace(stage, bind=bind, fit=fit, adapt=adapt, oracle=oracle)
 
 
-def _place(error: Exception) -> str:
+def _place(error: BaseException) -> str:
     """Return file and line of an error in code from outside, as `` (mine.py:12)``; else nothing."""
     lines = traceback.extract_tb(error.__traceback__)
     outside = [line for line in lines if PACKAGE not in Path(line.filename).parents]

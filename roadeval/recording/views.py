@@ -139,7 +139,7 @@ def _tabs(layout: Layout) -> list[BlueprintPart]:
         ]
         grid = rrb.Grid(outcome(layout, variant), *views, name=variant.name)
         of_variants += [grid] if views else []
-    if layout.disturbed:
+    if of_variants:
         tabs.append(rrb.Tabs(*of_variants, active_tab=0, name="Disturbed"))
     if layout.has_truth:
         masks = [*layout.scored()]

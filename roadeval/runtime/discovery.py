@@ -72,7 +72,7 @@ def installed(
                     raise ValueError(f"the name {name!r} is taken")
                 names |= {name} - {""}
                 things.append(thing)
-        except Exception as problem:  # code from outside may raise anything
+        except (Exception, SystemExit) as problem:  # code from outside may raise anything
             what = f"cannot be used for {kind}: {one_line(problem)}"
             raise error(what, where=f"the package {package_of(point)}") from problem
     return things

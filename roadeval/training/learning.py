@@ -345,13 +345,14 @@ def choose_frames(
     left = [number for number in numbers if number not in beside | trained | lost.keys()]
     if with_truth and trained and not left:
         fewer = max(len(numbers) // (2 + 2 * gap), 1)
+        # With a long gap one training frame is too many.
+        change = "lower {training.gap}, " if beside else ""
+        change = f"set {{training.frames}} to {fewer}, " if len(numbers) > 1 + gap else change
         used = f" ({len(trained)}) or left out as its gap ({len(beside)})" if beside else ""
         raise TrainingError(
             f"all {len(numbers)} labelled frames in the range are used for training{used}, so none "
             "is left to score",
-            remedy=Sentence("set {training.frames} to {}, {}", fewer, WITHOUT_TRAINING)
-            if fewer + gap < len(numbers)
-            else WITHOUT_TRAINING,
+            remedy=Sentence("{}{}", Sentence(change), WITHOUT_TRAINING),
         )
     return Schedule(gap=beside, first=left[0] if left else None)
 

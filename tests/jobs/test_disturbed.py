@@ -103,6 +103,12 @@ def test_masks_from_elsewhere_cannot_be_disturbed_which_is_said_once(ran):
     ]
 
 
+def test_masks_from_elsewhere_alone_are_recorded_without_a_disturbance(drive, tmp_path):
+    outcome = run(drive, tmp_path, disturb=[FOG], masks=MASKS, only=["net"])
+    assert roadeval.Recording(outcome.recording).variants
+    assert not outcome.facts.disturbances
+
+
 def test_without_truth_nothing_is_disturbed(drive, tmp_path):
     outcome = run(drive, tmp_path, disturb=[FOG], truth="", only=["unfiltered"])
     assert not (tmp_path / "reports" / "disturbances.csv").exists()

@@ -211,3 +211,18 @@ def test_masks_of_other_content_make_another_recording_wherever_they_lie(places)
             return identity(log, config, {"net": digest})
 
     assert of("1", "here") == of("1", "there") != of("2", "here")
+
+
+@pytest.mark.parametrize(("level", "where"), [(128, "nowhere"), (255, "everywhere")])
+def test_truth_of_one_kind_alone_is_told_of(places, level, where, tmp_path):
+    """If nothing is trained, nothing else would notice that labels are read wrongly."""
+    (tmp_path / "truth").mkdir()
+    for frame in frames_in(places / "drive.mcap", **WITH_MASKS):
+        label = np.full(frame.external["net"].shape, level, np.uint8)
+        label[:4] = 255 * (level == 255)
+        cv2.imwrite(str(tmp_path / "truth" / f"{frame.number}.png"), label)
+    beside = masks(places, npy={"path": "npy"})
+    labels = {"path": str(tmp_path / "truth")}
+    config = roadeval.configure({"truth": labels, "masks": beside, "only": ["npy"]})
+    outcome = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "out")
+    assert any(f"the truth is road {where}" in warning for warning in outcome.warnings)

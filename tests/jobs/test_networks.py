@@ -116,6 +116,17 @@ def test_a_notebook_runs_a_network_on_an_image(folder):
     assert not result.final()[:20].any()
 
 
+@pytest.mark.parametrize(
+    "image",
+    [np.zeros((48, 64, 3)), np.zeros((3, 48, 64), np.uint8), np.zeros((48, 64, 4), np.uint8)],
+    ids=lambda image: f"{image.dtype} {image.shape}",
+)
+def test_a_notebooks_image_has_three_channels_of_eight_bits_which_come_last(folder, image):
+    config = with_network(folder / "red.onnx")
+    with pytest.raises(roadeval.RoadevalError, match="not uint8"):
+        roadeval.run_frame(image, None, config, variant="mine")
+
+
 def test_a_fleet_replays_a_drive_again_when_the_network_has_changed(folder, tmp_path):
     from tests.e2e.test_fleet import Here
 

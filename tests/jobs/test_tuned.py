@@ -318,3 +318,17 @@ def test_what_cannot_be_tuned(folder, name, told):
     config = configure(SMALL).with_variants([network_variant("mine", "n.onnx")])
     with pytest.raises(ConfigError, match=told.replace("(", r"\(").replace(")", r"\)")):
         config.with_tuned([name])
+
+
+@pytest.mark.parametrize("is_network", [True, False])
+def test_a_tuned_variant_takes_no_other_methods_place(is_network):
+    """The user's own ``mine_tuned`` would be gone without a word."""
+    other = {} if is_network else {"masks": {"mine_tuned": {"path": "masks"}}}
+    networks = ["mine", "mine_tuned"] if is_network else ["mine"]
+    made = [network_variant(name, "n.onnx") for name in networks]
+    config = configure(SMALL | other).with_variants(made)
+    with pytest.raises(ConfigError, match="the name is taken"):
+        config.with_tuned(["mine"])
+    alone = configure(SMALL).with_variants([network_variant("mine", "n.onnx")])
+    once = alone.with_tuned(["mine"])
+    assert once.with_tuned(["mine"]) == once

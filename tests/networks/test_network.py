@@ -69,6 +69,16 @@ def test_road_is_where_it_beats_the_others_and_as_probable_as_its_classes(last, 
         assert np.abs(codes / data.CERTAIN - shares[number]).max() < 1e-4
 
 
+def test_grey_levels_of_one_class_are_not_taken_for_logits(tmp_path):
+    values = balanced(IMAGE, 1)
+    values["w2"], values["b2"] = 40 * np.abs(values["w2"]), np.float32([0.5])
+    path = network(tmp_path / "n.onnx", classes=1, values=values)
+    with pytest.raises(networks.NetworkError, match="call every pixel road") as asked:
+        opened(path)
+    assert 'activation = ?  # "sigmoid"' in asked.value.draft
+    assert opened(path, activation="sigmoid").road(IMAGE).mask.pixels().all()
+
+
 def test_classes_are_brought_to_the_frame_by_the_nearest_pixel(tmp_path):
     values = balanced(IMAGE)
     path = network(tmp_path / "n.onnx", values=values, last="ArgMax")

@@ -36,6 +36,23 @@ def gradual(image):
     return np.repeat(np.linspace(0, 1, len(image))[:, None], image.shape[1], axis=1)
 
 
+def gradual_in_half_precision(image):
+    return gradual(image).astype(np.float16)
+
+
+def levels_of_grey(image):
+    return image[..., 1]
+
+
+def minus_one_elsewhere(image):
+    return lower_half(image).astype(int) - 1
+
+
+def writes_into_the_image(image):
+    image[:] = 255
+    return lower_half(image)
+
+
 def fails_on_13(image, moment):
     if moment is not None and moment.number == 13:
         raise ZeroDivisionError("no\nroad")
@@ -50,6 +67,10 @@ def fails_in_the_dark(image):
 
 def always_fails(image):
     raise KeyError("weights")
+
+
+def leaves(image):
+    raise SystemExit(0)
 
 
 def wrong_size(image):
@@ -88,6 +109,11 @@ def bind(_settings, level):
     return run
 
 
+def _bind_writing(_settings, _parameters):
+    return lambda view: view.image.fill(0)
+
+
+WRITES = Stage("writes", "Writes", Share, _bind_writing, (BRIGHT,))
 LEARNS = Stage("bright", "Brightness", Share, bind, (LEVEL, BRIGHT), fit=fit, parameters=Level)
 
 

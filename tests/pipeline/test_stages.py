@@ -52,6 +52,22 @@ def test_floats_are_probabilities():
     assert np.array_equal(output.mask.pixels(), output.probability > 32768)
 
 
+def test_probabilities_may_have_half_precision():
+    half, full = output_of("gradual_in_half_precision"), output_of("gradual")
+    assert np.abs(half.probability.astype(int) - full.probability).max() <= 65535 / 2**11
+    assert np.array_equal(half.mask.pixels(), full.mask.pixels())
+
+
+def test_what_a_method_writes_into_its_image_no_other_method_sees():
+    image = IMAGE.copy()
+    (function,) = stages_of([somebodys("writes_into_the_image")])
+    function.bind(function.settings(), None)(View.of(image))
+    (stage,) = stages_of([somebodys("WRITES")])
+    with pytest.raises(StageError, match=r"writes failed: ValueError: .*read-only"):
+        stage.bind(stage.settings(), None)(View.of(image))
+    assert np.array_equal(image, IMAGE)
+
+
 def test_a_function_can_ask_for_the_moment():
     assert ones(output_of("fails_on_13", Moment(12, 0)).mask.bits) == 24
     with pytest.raises(StageError, match="stage fails_on_13 failed: ZeroDivisionError: no road"):
@@ -68,6 +84,9 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
     ("name", "message"),
     [
         ("wrong_size", r"its mask is \(2, 2\)"),
+        ("leaves", r"leaves failed: SystemExit: 0 \(somebody.py:"),
+        ("levels_of_grey", "no mask of 0 and one other level"),
+        ("minus_one_elsewhere", "no mask of 0 and one other level"),
         ("LAYERS", "a layer 'level' that its stage does not"),
     ],
 )
@@ -84,6 +103,7 @@ def test_an_output_that_cannot_be_is_an_error(name, message):
         (somebodys("Callable"), "neither a Stage nor a function"),
         (somebodys("TAKEN"), "'svm' is that of a stage of roadeval"),
         (somebodys("UNNAMEABLE"), "must be of letters, digits"),
+        ("tests.pipeline.ending:road", "cannot be used: SystemExit: 0"),
         ("no_such_module:road", "there is no module no_such_module: install it"),
         ("pickle:loads", "its argument data is none of image"),
         ("blur", "there is no stage 'blur'; choose"),

@@ -145,10 +145,12 @@ def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
         learn(log(4), frames=frames, gap=gap)
 
 
-@pytest.mark.parametrize(("count", "gap"), [(1, 0), (2, 2)])
-def test_fewer_frames_to_train_on_are_not_asked_for_where_none_would_be_left(count, gap):
-    with pytest.raises(TrainingError, match=r"none is left to score; give `training\.model`"):
-        learn(log(count), frames=1, gap=gap)
+@pytest.mark.parametrize(
+    ("count", "gap", "remedy"), [(4, 3, r"lower `training\.gap`, give"), (1, 0, r"score; give")]
+)
+def test_if_one_training_frame_is_too_many_none_is_advised(count, gap, remedy):
+    with pytest.raises(TrainingError, match=f"none is left to .*{remedy}"):
+        learn(log(count), frames=2, gap=gap)
 
 
 def test_an_image_that_trained_is_recognised_wherever_it_lies():

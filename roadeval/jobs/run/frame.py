@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+import numpy as np
+
 from roadeval.config.run import RunConfig
 from roadeval.config.variants import Variant
 from roadeval.data import (
@@ -112,5 +114,7 @@ def run_frame(
     pipeline = pipelines[variant]
     if model is None and pipeline.learning_stages():
         raise RoadevalError(f"variant {variant} needs a model: its stages learn")
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
+        raise RoadevalError(f"the image is {image.dtype} {image.shape}, not uint8 (H, W, 3)")
     learnt = {} if model is None else model.parameters.get(variant, {})
     return run_variant(variant, pipeline.bind(learnt), View.of(image))

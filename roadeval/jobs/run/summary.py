@@ -269,7 +269,7 @@ def versions() -> dict[str, str]:
 
 def warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield warnings that a user should read before using the results."""
-    yield from _truth_warnings(run)
+    yield from _truth_warnings(run, totals)
     yield from (str(damage) for damage in run.log.damage if not damage.lossy)
     yield from (Sentence("{}: {}", run.selection.image.name, n) for n in run.selection.notes)
     yield from run.frames.accounting.notes
@@ -307,8 +307,13 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
     yield from run.model.warnings
 
 
-def _truth_warnings(run: Run) -> Iterator[str]:
+def _truth_warnings(run: Run, totals: Totals) -> Iterator[str]:
     """Yield warnings for a log with little truth, or none."""
+    finals = [[*stages.values()][-1] for stages in totals.values()]
+    for where, counts in (("nowhere", ("TP", "FN")), ("everywhere", ("TN", "FP"))):
+        is_seen = any(total[count] for total in finals for count in counts)
+        if not is_seen and any(total["N"] for total in finals):
+            yield f"the truth is road {where}, on all frames that are scored: is it read right?"
     if missing := run.selection.no_truth:
         no_truth = "there is no road truth to score against, only masks to look at: {}"
         yield Sentence(no_truth, missing)
