@@ -24,7 +24,7 @@ FIGURES = [
 ]
 TABLES = [
     *("frames.csv", "windows.csv", "regions.csv", "summary.json", "run.toml"),
-    *("changes.csv", "conditions.csv", "disagreements.csv", "heat.csv", "oracles.csv"),
+    *("changes.csv", "conditions.csv", "disagreements.csv", "heat.csv", "oracles.csv", "parts.csv"),
 ]
 
 

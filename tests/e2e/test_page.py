@@ -202,7 +202,9 @@ def test_the_address_names_the_frame_and_back_goes_to_the_last_one(table, drive,
 
 
 def picture_of(tab, canvas):
-    """A picture of the film, ``(H, W, 3)``."""
+    """A picture of the film, ``(H, W, 3)``; a canvas has 300x150 pixels until it is drawn."""
+    size = f"document.querySelector('.views .{canvas}').width"
+    tab.wait_for_function(f"() => {size} !== 300")
     shape, pixels = tab.locator(f".views .{canvas}").evaluate(
         "c => [[c.height, c.width, 4], "
         "[...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]]"
