@@ -13,6 +13,7 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError, RunConfig
+from roadeval.jobs.results import audit as label_audit
 from tests.e2e.commands import here
 from tests.evaluation.test_fit import LABELS as FRAMES
 from tests.evaluation.test_fit import image_at, method_at, wrong_labels
@@ -147,6 +148,17 @@ def test_a_report_begins_its_reasons_with_what_an_audit_says(audited, place, tmp
     places = [told.index(words) for words in ("Why mine errs", *found.doubts)]
     assert len(places) == 3
     assert places == sorted(places)
+
+
+def test_without_a_clearly_wrong_label_a_report_has_no_doubt_about_labels(place, monkeypatch):
+    rank = label_audit.rank_suspects
+    monkeypatch.setattr(
+        label_audit, "rank_suspects", lambda *about: rank(*about).assign(clear=False)
+    )
+    found = roadeval.audit(place / "drive.rrd", annotators=["b"])
+    assert found.sentences[0] == "No label is clearly wrong."
+    assert found.doubts == found.sentences[1:]
+    assert len(found.doubts) == 1
 
 
 def test_a_report_takes_no_audit_of_another_drive(audited, place, tmp_path) -> None:

@@ -23,7 +23,7 @@ from roadeval.results.facts import Facts, Reason
 from roadeval.results.over_drives import slices_over_drives
 from roadeval.results.sentences import notes
 from roadeval.results.tables import read_table
-from roadeval.results.why import describe_disturbances, explain
+from roadeval.results.why import describe_disturbances, explain, with_doubts
 from tests.evaluation.making import a_change, a_comparison, a_difference
 from tests.results.making import facts_of
 from tests.results.test_verdict import rates
@@ -227,6 +227,17 @@ def test_frames_of_several_drives_are_not_named():
 def test_reasons_are_read_back_as_they_were_written():
     facts = replace(FACTS, why=explain(FACTS, CLASSES))
     assert Facts.parse(facts.text(), "here").why == facts.why
+
+
+def test_doubts_about_labels_come_first_and_at_most_four_reasons_are_kept():
+    facts = replace(FACTS, why=explain(FACTS, CLASSES))
+    doubts = ["The label of frame 3 looks wrong.", "b and the truth differ."]
+    told = with_doubts(facts, doubts).why
+    assert facts.why
+    for name, reasons in facts.why.items():
+        expected = [*doubts, *(reason.sentence for reason in reasons)][:4]
+        assert [reason.sentence for reason in told[name]] == expected
+    assert with_doubts(facts, []) == facts
 
 
 # --- Slices over drives: tags, and times of the drive and of the day, are conditions, too ---------
