@@ -27,7 +27,7 @@ from roadeval.logs.settings import (
 )
 from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
-from tests.fixtures.flavours import FLAVOURS, file_fields, in_json, scenes
+from tests.fixtures.flavours import FLAVOURS, file_fields, foxglove_json, in_json, scenes
 from tests.fixtures.shared import both, shared
 from tests.logs.making import SECOND, compressed, drive, frames, grey, jpeg, png, raw, ros2_log
 
@@ -128,6 +128,31 @@ def test_a_stamp_beyond_all_clocks_cannot_be_read(tmp_path, stamp):
     with open_log(tmp_path / "drive.mcap") as log:
         (camera,) = log.readers.values()
         assert camera.stamp(0) == (stamp if stamp == 2**63 - 1 else UNREADABLE)
+
+
+@pytest.mark.parametrize("used", ["foxglove.CompressedImage", "drive.Event"])
+def test_a_topic_carries_what_its_messages_are_and_not_a_channel_without_one(tmp_path, used):
+    path = tmp_path / "drive.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channels = {
+            name: writer.register_channel(
+                "/camera", "json", writer.register_schema(name, "jsonschema", b"{}")
+            )
+            for name in sorted(("drive.Event", "foxglove.CompressedImage"), key=used.__eq__)
+        }
+        image = foxglove_json("CompressedImage", file_fields).messages[0].data
+        writer.add_message(channels[used], log_time=START, publish_time=START, data=image)
+        writer.finish()
+    with open_log(path) as log:
+        (topic,) = log.topics
+        assert (topic.schema, topic.count) == (used, 1)
+        if topic.is_image:
+            assert len([*log.frames(log.select())]) == 1
+        else:
+            with pytest.raises(LogError, match=r"no image topic; the log has: /camera"):
+                log.select()
 
 
 # --- All that there is to say about a log, as plain data ------------------------------------------

@@ -78,7 +78,8 @@ class TopicInfo:
 
 def describe_topic(reader: TopicReader) -> TopicInfo:
     """Describe a topic by the places of its messages, and by the first readable one."""
-    _, channel, schema, _ = reader.channels[0]
+    # A topic may have channels of several schemas: that of messages which are read describes it.
+    _, channel, schema, _ = max(reader.channels, key=lambda source: _use_of(source.log))
     logs = [source.log for source in reader.channels if source.log.count]
     count = sum(log.count for log in logs)
     first = min((log.first_ns for log in logs), default=None)
@@ -118,6 +119,10 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
         if tries == 3:
             break
     return replace(topic, problem=problem) if topic.schema else replace(topic, kind=TopicKind.OTHER)
+
+
+def _use_of(log: ChannelLog) -> tuple[bool, bool]:
+    return log.wanted and log.count > 0, log.count > 0
 
 
 def median_period(log_times: npt.NDArray[np.int64]) -> int:
