@@ -440,8 +440,8 @@ class Log:
                 excerpt.names(names, max(span[0], 0))
             for log_time, reader, position in sorted(messages, key=itemgetter(0)):
                 with suppress(FrameError):
-                    _, channel, schema, _ = reader.carrier(position)
-                    excerpt.copy(channel, schema, reader.message(position), log_time)
+                    for (_, channel, schema, _), message in reader.messages(position):
+                        excerpt.copy(channel, schema, message, log_time)
 
     def close(self) -> None:
         """Close the files of the log, and of logs beside it."""

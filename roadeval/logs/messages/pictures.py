@@ -263,6 +263,11 @@ _PARAMETER_UNITS: Final = {
     "hevc": re.compile(rb"\x00\x00\x01[\x40-\x45].*?(?=\x00\x00\x01|\Z)", re.DOTALL),
 }
 """All parameters, which some encoders send once, at the beginning."""
+_NO_SLICES: Final = {
+    "h264": frozenset(kind | rank << 5 for kind in range(6, 14) for rank in range(4)),
+    "hevc": frozenset(range(32 << 1, 41 << 1)),
+}
+"""First bytes of units without a picture: parameters, delimiters, messages and ends."""
 
 
 class PictureSequence(Protocol):
@@ -493,6 +498,15 @@ def turn_of(frame: Any) -> int:
     exchanged = abs(b) > abs(a)
     signs = (b < 0, c < 0) if exchanged else (d < 0, a < 0)
     return next(n for n, turn in ORIENTATIONS.items() if turn == (exchanged, *signs))
+
+
+def has_no_picture(packet: Picture) -> bool:
+    """Return whether a packet of a video holds nothing but parameters and the like."""
+    kinds = _NO_SLICES.get(codec_of(packet) or "", frozenset[int]())
+    data = bytes(packet.data) if kinds else b""
+    units = re.finditer(b"\0\0\1(.)", data, re.DOTALL)
+    are_others = (unit[1][0] in kinds for unit in units)
+    return next(are_others, False) and all(are_others)
 
 
 def is_keyframe(packet: Picture) -> bool:

@@ -27,6 +27,8 @@ CACHE: Final = 16 << 20
 then its chunk, which holds mostly other topics, is no longer in memory."""
 ENOUGH: Final = 5
 """The rate of a topic is computed from more intervals between messages than this."""
+FIRST_KEYFRAME: Final = 300
+"""Packets among which a video's first keyframe is searched; a log may begin between keyframes."""
 SMALL: Final = 50_000_000
 """Bytes of a log that may be read completely, which takes a moment."""
 
@@ -81,7 +83,9 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
     # A topic may have channels of several schemas: that of messages which are read describes it.
     _, channel, schema, _ = max(reader.channels, key=lambda source: _use_of(source.log))
     logs = [source.log for source in reader.channels if source.log.count]
-    count = sum(log.count for log in logs)
+    if pictures.kind_of(channel, schema) in (TopicKind.VIDEO, TopicKind.COMPRESSED):
+        reader.join_parameters()
+    count = sum(log.count for log in logs) - reader.joined
     first = min((log.first_ns for log in logs), default=None)
     last = max((log.last_ns for log in logs), default=None)
     times = reader.log_times
@@ -139,7 +143,7 @@ def _describe_picture(reader: TopicReader, position: int) -> dict[str, Any]:
         channels = 1 if raw_format(picture, reader.limits).is_grey else 3
     elif name := pictures.codec_of(picture) or "":
         video = pictures.Video(reader, reader.limits)
-        for at in range(min(len(reader), 300)):  # a log may begin between keyframes
+        for at in range(min(len(reader), FIRST_KEYFRAME)):
             with suppress(FrameError, LogError):
                 first = video.picture(at)
                 size, turned = first.pixels.shape[1::-1], first.turned
@@ -212,6 +216,8 @@ class TopicReader:
         """The least and the greatest time from stamp to log time, of the stamps read so far."""
         self._cache: dict[int, Message] = {}
         self._cached_bytes = 0
+        self._before: dict[int, list[tuple[FileChannel, Message]]] = {}
+        """Packets of a video without a picture, by the position of the packet behind them."""
 
     def __len__(self) -> int:
         return len(self.log_times)
@@ -262,15 +268,55 @@ class TopicReader:
             self.log_times[listed[wrong]], self._places[listed[wrong], 0] = right
 
     def picture(self, position: int) -> pictures.LoggedPicture:
-        """Read the picture of a message; a `FrameError` if it cannot be read or decoded."""
+        """Read the picture of a message; a `FrameError` if it cannot be read or decoded.
+
+        A packet of a video begins with those before it that have no picture.
+        """
         message = self.message(position)
         try:
             picture = self._decoder(position).picture(message.data)
-            if isinstance(picture, pictures.CompressedPicture) and picture.number is None:
-                return replace(picture, number=message.sequence)
-            return picture
+            if not isinstance(picture, pictures.CompressedPicture):
+                return picture
+            number = message.sequence if picture.number is None else picture.number
+            before = [
+                pictures.decoder_for(carrier.channel, carrier.schema).picture(packet.data).data
+                for carrier, packet in self._before.get(position, ())
+            ]
+            data = b"".join(map(bytes, (*before, picture.data))) if before else picture.data
+            return replace(picture, number=number, data=data)
         except BadMessage as error:
             raise self._error(position, error.sentence) from error
+
+    def join_parameters(self) -> None:
+        """Take the packets of a video that have no picture as parts of the packet behind them.
+
+        All packets are read if one without a picture comes before the first keyframe.
+        """
+        for position in range(min(len(self), FIRST_KEYFRAME)):
+            with suppress(FrameError):
+                packet = self.picture(position)
+                if pictures.has_no_picture(packet):
+                    break
+                if pictures.codec_of(packet) is None or pictures.is_keyframe(packet):
+                    return
+        else:
+            return
+        before, kept = dict[int, list[tuple[FileChannel, Message]]](), list[int]()
+        for position in range(len(self)):
+            with suppress(FrameError):
+                if pictures.has_no_picture(self.picture(position)):
+                    packet = self.carrier(position), self.message(position)
+                    before.setdefault(len(kept), []).append(packet)
+                    continue
+            kept.append(position)
+        self.log_times, self._places = self.log_times[kept], self._places[kept]
+        self._stamps = array("q", [UNREAD]) * len(kept)
+        self._before, self._cache, self._cached_bytes = before, {}, 0
+
+    def messages(self, position: int) -> Iterator[tuple[FileChannel, Message]]:
+        """Read a message, and before it the packets that were joined to it."""
+        yield from self._before.get(position, ())
+        yield self.carrier(position), self.message(position)
 
     def fields(self, position: int) -> Any:
         """Read a message of any kind; a `FrameError` or `BadMessage` if that fails."""
@@ -335,9 +381,15 @@ class TopicReader:
         inside = places[places[:, 2] != OUTSIDE, 1:]
         return len(np.unique(inside, axis=0)) + len(places) - len(inside)
 
+    @property
+    def joined(self) -> int:
+        """The number of packets without a picture, which are parts of others."""
+        return sum(map(len, self._before.values()))
+
     def expected(self) -> int:
         """Return the number of messages by the files' own statistics."""
-        return sum(s.container.expected.get(s.channel.id, 0) for s in self.channels)
+        total = sum(s.container.expected.get(s.channel.id, 0) for s in self.channels)
+        return total - self.joined
 
     @property
     def sure(self) -> int:

@@ -36,7 +36,7 @@ from roadeval.logs.messages.pixels import to_labels, to_rgb
 from roadeval.logs.settings import FrameSettings, LabelPlace, LabelSettings, LogConfig
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar, packets
 from tests.fixtures.shared import both
-from tests.logs.making import COMPRESSED, compressed, frames, png, ros2_log
+from tests.logs.making import COMPRESSED, PERIOD, START, compressed, frames, png, ros2_log
 
 STAMP = 1_700_000_000_123_456_789
 NAME = "sensor_msgs/msg/CompressedImage"
@@ -512,6 +512,36 @@ def test_a_frame_does_not_depend_on_where_reading_begins(bf: int, more: str, onc
             luma = reading.picture(position).pixels[..., 1]
             shown = np.clip((MOVING[place].astype(int) - 16) * 255 / 219, 0, 255)
             assert np.abs(luma - shown).mean() < 5
+
+
+def parted(codec: str, data: bytes) -> list[bytes]:
+    """Return a packet of a video with its parameters in packets of their own."""
+    units = [b"\0\0\1" + unit for unit in re.split(rb"\x00*\x00\x00\x01", data)[1:]]
+    heads = b"\x67\x68" if codec == "h264" else b"\x40\x42\x44"
+    alone = [unit for unit in units if unit[3] in heads]
+    return [*alone, b"".join(unit for unit in units if unit not in alone)]
+
+
+@pytest.mark.parametrize("codec", ["h264", "h265"])
+def test_packets_of_parameters_alone_are_no_frames_and_take_no_label(codec, tmp_path):
+    messages, at = [], 0
+    for number, data in enumerate(packets(codec)):
+        stamp = START + number * PERIOD
+        for part in parted(codec, data):
+            messages.append(("/camera", START + at * PERIOD, compressed(stamp, part, codec)))
+            at += 1
+        mask = np.full(bar(0).shape[:2], 255, np.uint8)
+        messages.append(("/labels", START + at * PERIOD - 1, compressed(stamp, png(mask), "png")))
+    assert at > VIDEO_FRAMES + 5
+    with open_log(ros2_log(tmp_path / "a.mcap", messages)) as log:
+        stream = log.frames(log.select())
+        frames_read = [frame.decode() for frame in stream]
+        assert log.losses == stream.accounting.losses == ()
+        (count,) = (topic.count for topic in log.topics if topic.name == "/camera")
+    assert [frame.number for frame in frames_read] == list(range(VIDEO_FRAMES)) == [*range(count)]
+    assert [(f.stamp_ns - START) // PERIOD for f in frames_read] == list(range(VIDEO_FRAMES))
+    assert all(np.abs(f.image.astype(int) - bar(f.number)).mean() < 5 for f in frames_read)
+    assert all(frame.truth is not None for frame in frames_read)
 
 
 @pytest.mark.parametrize("lost", range(1, 30))

@@ -35,7 +35,7 @@ from roadeval.logs.writing.writer import LogWriter, SidecarWriter, pack
 from tests.fixtures.make import make
 from tests.fixtures.shared import shared
 from tests.logs.making import COMPRESSED, SECOND, compressed, grey, jpeg, png, ros2_log
-from tests.logs.messages.test_decoders import KEYED, MOVING, encoded, without_parameters
+from tests.logs.messages.test_decoders import KEYED, MOVING, encoded, parted, without_parameters
 
 HALF_SECOND = 500_000_000
 
@@ -448,12 +448,17 @@ def test_the_video_of_an_excerpt_begins_at_a_keyframe(tmp_path):
         assert [frame.decode().number for frame in part.frames(part.select())] == [*range(5)]
 
 
-def test_an_excerpt_has_the_parameters_of_a_video_that_were_sent_once(tmp_path):
+@pytest.mark.parametrize("alone", [False, True])
+def test_an_excerpt_has_the_parameters_of_a_video_that_were_sent_once(tmp_path, alone):
     video = encoded(MOVING, 0, KEYED)
     packets = [video[0][1], *(without_parameters(data) for _, data in video[1:])]
     messages = [
+        ("/camera", SECOND, compressed(SECOND, part, "h264"))
+        for part in (parted("h264", packets.pop(0)) if alone else [packets.pop(0)])
+    ]
+    messages += [
         ("/camera", at * SECOND, compressed(at * SECOND, data, "h264"))
-        for at, data in enumerate(packets, 1)
+        for at, data in enumerate(packets, 2)
     ]
     with open_log(ros2_log(tmp_path / "a.mcap", messages), every_topic=True) as log:
         log.write_excerpt("/camera", 25, 26, tmp_path / "part.mcap")
