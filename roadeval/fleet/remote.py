@@ -159,13 +159,17 @@ class _FileState(NamedTuple):
         return self.size != other.size or (one != two and "" not in (one, two)) or is_later
 
 
+_Answer = tuple[_FileState, bytearray, str]
+"""The state of the file, the bytes that a server sent, and how it compressed them, if it did."""
+
+
 @dataclass(slots=True)
 class _Part:
     """Bytes of a file, and the server's answer if it was asked for them."""
 
     begin: int
     end: int
-    answer: Future[tuple[_FileState, bytearray]] | None = None
+    answer: Future[_Answer] | None = None
 
 
 class _RemoteFile(FarFile):
@@ -237,14 +241,14 @@ class _RemoteFile(FarFile):
         self._read_ahead()
         return part
 
-    def _ask_for(self, part: _Part) -> Future[tuple[_FileState, bytearray]]:
+    def _ask_for(self, part: _Part) -> Future[_Answer]:
         if part.answer is None:
             self._place.traffic.requests += 1
             self._place.traffic.bytes += part.end - part.begin
             part.answer = in_thread(partial(self._fetch, part.begin, part.end))
         return part.answer
 
-    def _fetch(self, begin: int, end: int) -> tuple[_FileState, bytearray]:
+    def _fetch(self, begin: int, end: int) -> _Answer:
         import obstore
 
         options = {"range": (begin, end), **self._options}
@@ -254,18 +258,21 @@ class _RemoteFile(FarFile):
             content += piece
             if len(content) > end - begin:  # the stream may never end
                 break
-        return _FileState.of(answer.meta), content
+        return _FileState.of(answer.meta), content, answer.attributes.get("Content-Encoding", "")
 
     def _content(self, part: _Part) -> bytearray:
         """Wait for a part, and return its bytes."""
         where = public_source(self._place.url)
         try:
-            state, content = _wait_for(self._place.url, self._ask_for(part))
+            state, content, packed = _wait_for(self._place.url, self._ask_for(part))
         except FleetError as error:
             if error.problem != NO_PARTS:
                 raise
             problem = "the server gives no parts of files"
             raise FleetError(problem, where=where, remedy="copy the file here") from None
+        if packed and (state.size, len(content)) != (self._size, part.end - part.begin):
+            problem = f"the server compresses it with {packed}, unasked"
+            raise FleetError(problem, where=where, remedy="copy the file here")
         if state.differs(self._state):
             raise FleetError(CHANGED, where=where)
         if len(content) != part.end - part.begin:
@@ -326,22 +333,25 @@ def _open_store(url: str, patience_s: float) -> _Place:
         ) from error
     # The limits for connecting, for the next bytes, for the whole answer, and for trying again.
     pause = timedelta(seconds=patience_s / 2)
+    # Without this header a server may compress what it sends.
+    headers = {"accept-encoding": "identity"}
     times = {"connect_timeout": pause, "read_timeout": pause, "timeout": timedelta(days=1)}
     retries = {**RETRIES, "retry_timeout": pause}
     if scheme in BUCKETS:
         bucket, key = bucket_and_key(url)
         kind = stores.S3Store if scheme == "s3" else stores.GCSStore
         # obstore ignores this variable if any option is given.
-        allowed = {**times, "allow_http": os.environ.get("AWS_ALLOW_HTTP", "false")}
+        allow_http = os.environ.get("AWS_ALLOW_HTTP", "false")
+        allowed = {**times, "default_headers": headers, "allow_http": allow_http}
         store = _ask(url, kind, bucket, client_options=allowed, retry_config=retries)
         return _Place(url, store, Traffic(), key)
     parts = urlsplit(url)
     user, at, host = parts.netloc.rpartition("@")
     plain = urlunsplit((parts.scheme, host, parts.path, parts.query, ""))
-    options: dict[str, Any] = {**times, "allow_http": scheme == "http"}
+    options = {**times, "default_headers": headers, "allow_http": scheme == "http"}
     if at:
         basic = b64encode(unquote(user).encode()).decode()
-        options["default_headers"] = {"authorization": f"Basic {basic}"}
+        headers["authorization"] = f"Basic {basic}"
     store = _ask(url, stores.HTTPStore, plain, client_options=options, retry_config=retries)
     return _Place(url, store, Traffic())
 

@@ -6,6 +6,7 @@ does, too: ``/bucket/key`` is an object of its bucket.
 
 from __future__ import annotations
 
+import gzip
 import os
 import re
 import time
@@ -76,19 +77,24 @@ class _Handler(BaseHTTPRequestHandler):
             return
         later = self.command == "GET"
         hour = 8 if kind == "touched" and later else 7
-        headers = {"ETag": tag, "Last-Modified": f"Wed, 21 Oct 2015 {hour:02}:28:00 GMT"}
-        if kind == "retagged" and later:
-            headers["ETag"] = '"another"'
+        tags = {"retagged": '"another"', "weakened": f"W/{tag}"} if later else {}
+        headers = {
+            "ETag": tags.get(kind, tag),
+            "Last-Modified": f"Wed, 21 Oct 2015 {hour:02}:28:00 GMT",
+        }
         if kind in ("touched", "untagged", "grown"):
             del headers["ETag"]
-        if kind == "weakened" and later:
-            headers["ETag"] = f"W/{tag}"
         begin, end, size = 0, len(content), len(content)
         byte_range = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         if byte_range is not None and kind != "early":
             begin, end = int(byte_range[1]), int(byte_range[2]) + 1
             size += kind == "grown"
             headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
+        if later and self._compresses(kind):
+            # The range is one of the compressed file.
+            content, headers["Content-Encoding"] = gzip.compress(content), "gzip"
+            end = min(end, len(content))
+            headers["Content-Range"] = f"bytes {begin}-{end - 1}/{len(content)}"
         length = 1 << 40 if kind == "endless" and body else end - begin
         self._head(206 if "Content-Range" in headers else 200, length, **headers)
         if body and kind == "endless":
@@ -103,6 +109,10 @@ class _Handler(BaseHTTPRequestHandler):
         elif body:
             self.server.sent += end - begin
             self.wfile.write(content[begin:end])
+
+    def _compresses(self, kind: str) -> bool:
+        asked_as_is = self.headers.get("Accept-Encoding") == "identity"
+        return kind == "zipped" or (kind == "zipping" and not asked_as_is)
 
     def log_message(self, *_: Any) -> None:
         """Stay silent."""

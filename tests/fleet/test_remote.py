@@ -108,6 +108,7 @@ def test_user_and_password_of_a_url_are_sent(server):
         ("touched/a.mcap", "it changed while it was read"),
         ("grown/a.mcap", "it changed while it was read"),
         ("endless/a.mcap", "the server sends too much"),
+        ("zipped/a.mcap", "the server compresses it with gzip, unasked; copy the file here"),
     ],
 )
 def test_what_a_server_cannot_give_is_refused_in_one_line(server, path, message):
@@ -118,6 +119,10 @@ def test_what_a_server_cannot_give_is_refused_in_one_line(server, path, message)
 @pytest.mark.parametrize("kind", ["weakened", "untagged"])
 def test_a_tag_that_is_weakened_or_missing_is_no_change(server, kind):
     assert fetched(server.url(f"{kind}/a.mcap")) == CONTENT
+
+
+def test_a_server_that_may_compress_is_asked_not_to(server):
+    assert fetched(server.url("zipping/a.mcap")) == CONTENT
 
 
 def test_of_an_answer_without_end_little_more_than_was_asked_for_is_taken(server):

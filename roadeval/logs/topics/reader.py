@@ -305,8 +305,8 @@ class TopicReader:
         for position in range(len(self)):
             with suppress(FrameError):
                 if pictures.has_no_picture(self.picture(position)):
-                    packet = self.carrier(position), self.message(position)
-                    before.setdefault(len(kept), []).append(packet)
+                    joined = self.carrier(position), self.message(position)
+                    before.setdefault(len(kept), []).append(joined)
                     continue
             kept.append(position)
         self.log_times, self._places = self.log_times[kept], self._places[kept]
