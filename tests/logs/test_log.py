@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from mcap.writer import CompressionType, Writer
+from mcap_ros2._dynamic import serialize_dynamic
 
 from roadeval.logs import log
 from roadeval.logs.container import file, records
@@ -29,7 +30,18 @@ from roadeval.logs.topics import reader
 from roadeval.logs.topics.reader import UNREADABLE
 from tests.fixtures.flavours import FLAVOURS, file_fields, foxglove_json, in_json, scenes
 from tests.fixtures.shared import both, shared
-from tests.logs.making import SECOND, compressed, drive, frames, grey, jpeg, png, raw, ros2_log
+from tests.logs.making import (
+    COMPRESSED,
+    SECOND,
+    compressed,
+    drive,
+    frames,
+    grey,
+    jpeg,
+    png,
+    raw,
+    ros2_log,
+)
 
 START = 1_700_000_000_123_456_789
 STAMPS = [START + i * SECOND // 10 for i in range(10)]
@@ -294,6 +306,52 @@ def test_several_cameras_of_one_topic_are_told_and_one_can_be_chosen(tmp_path, n
         numbers = [number for number, other in enumerate(names) if other == name]
         assert [frame.number for frame in frames] == numbers
         assert not any("several cameras" in note for note in frames[0].accounting.notes)
+
+
+@pytest.mark.parametrize("offset_ms", [0.0, 5.0])
+@pytest.mark.parametrize("chosen", [None, "left", "middle", "right"])
+def test_of_cameras_with_one_stamp_the_one_that_a_label_names_has_it(tmp_path, chosen, offset_ms):
+    messages, names = [], ["left", "middle", "right"]
+    for second in range(1, 8):
+        for place, name in enumerate(names):
+            message = compressed(second * SECOND, png(grey(place)))
+            message["header"]["frame_id"] = name
+            messages.append(("/camera", second * SECOND + place, message))
+        stamp = second * SECOND - round(offset_ms * 1e6)
+        label = compressed(stamp, png(grey(255)))
+        label["header"]["frame_id"] = "middle"
+        messages.append(("/labels", second * SECOND + 9, label))
+    path = ros2_log(tmp_path / "a.mcap", messages)
+    _, frames = read(
+        path, topics=TopicSettings(frame_id=chosen, truth="/labels", sync_offset_ms=offset_ms)
+    )
+    of_frames = [chosen] * 7 if chosen else names * 7
+    assert [frame.labelled for frame in frames] == [name == "middle" for name in of_frames]
+
+
+@pytest.mark.parametrize("others", [1, 4])
+def test_messages_of_another_kind_on_the_topic_of_images_are_no_images(tmp_path, others):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        texts = {"sensor_msgs/msg/CompressedImage": COMPRESSED, "sensor_msgs/msg/CameraInfo": ""}
+        image, other = (
+            writer.register_channel("/c", "cdr", writer.register_schema(n, "ros2msg", t.encode()))
+            for n, t in texts.items()
+        )
+        encode = serialize_dynamic("sensor_msgs/msg/CompressedImage", COMPRESSED)
+        for number in range(6):
+            for place in range(others):
+                writer.add_message(other, number * SECOND + place, bytes(9), 0)
+            message = compressed(number * SECOND, png(grey(number)))
+            data = encode["sensor_msgs/msg/CompressedImage"](message)
+            writer.add_message(image, number * SECOND + others, data, 0)
+        writer.finish()
+    with open_log(path, every_topic=True) as log:
+        assert (log.topics[0].count, log.topics[0].rate_hz) == (6, 1.0)
+        frames = [frame.decode() for frame in log.frames(log.select())]
+    assert [frame.image.max() for frame in frames] == list(range(6))
 
 
 @pytest.mark.parametrize(("name", "told"), [(None, 0), ("rear", 1)])

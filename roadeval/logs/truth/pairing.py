@@ -234,14 +234,24 @@ class Partners:
             near = min(int(place), len(labels) - 1)
         middle = _seek(labels, stamp, near)
         equal = _find_equal(labels, stamp, middle, reach)
-        if self._pairing.is_small and (not equal or equal[0] in self.used):
+        twins = _find_equal(images, stamp, image, reach) if equal else []
+        cameras = [_camera_at(self._pairing.images, twin) for twin in twins] if twins[1:] else []
+        theirs = [_camera_at(self._pairing.labels, label) for label in equal] if cameras else []
+        # Of cameras that share a topic and a stamp, labels belong to the one that they name.
+        by_camera = len({*cameras}) > 1 and not {*cameras}.isdisjoint(theirs)
+        if by_camera:
+            ours = cameras[twins.index(image)]
+            twins = [at for at, name in zip(twins, cameras, strict=True) if name == ours]
+            equal = [at for at, name in zip(equal, theirs, strict=True) if name == ours]
+        elif self._pairing.is_small and (not equal or equal[0] in self.used):
             if image in self._all_equal:
                 return self._all_equal[image]
         elif not equal:
             equal = _find_equal(labels, stamp, min(self.near + 1, len(labels) - 1), reach)
-        if equal:
-            self.near = equal[0]
-            rank = sum(1 for other in _find_equal(images, stamp, image, reach) if other < image)
+        if equal or by_camera:
+            self.near = equal[0] if equal else self.near
+            twins = twins or _find_equal(images, stamp, image, reach)
+            rank = sum(1 for other in twins if other < image)
             return equal[rank] if rank < len(equal) else None
         label = self.near = _find_nearest(labels, stamp, middle, reach)
         label_stamp = labels.stamp(label)
@@ -312,6 +322,12 @@ def frames_of(
         # If many stamps are equal or out of order, two labels may find the same image.
         if image is not None and forth.of(image) == label:
             yield image
+
+
+def _camera_at(stamps: Stamps, position: int) -> str:
+    """Return the ``frame_id`` at a position; empty if there is none."""
+    reader = stamps.stamps if isinstance(stamps, Later) else stamps
+    return reader.frame_id(position) if isinstance(reader, TopicReader) else ""
 
 
 def _find_nearest(stamps: Stamps, stamp: int, middle: int, reach: int | None) -> int:
