@@ -78,7 +78,7 @@ _CODECS: Final = {
     **dict.fromkeys(("h264", "avc", "libx264"), "h264"),
     **dict.fromkeys(("h265", "hevc", "libx265"), "hevc"),
     "vp9": "vp9",
-    "av1": "av1",
+    **dict.fromkeys(("av1", "libsvtav1", "librav1e"), "av1"),
 }
 
 
@@ -380,10 +380,9 @@ class Video:
                 packet = self._packets.picture(position)
                 follows, last = self._follows(packet, last, numbers), packet
                 if is_keyframe(packet):
-                    if decoder is not None and (broken or not follows):
+                    if broken or not follows:
                         # Frames of an open group may build upon lost ones before the keyframe.
-                        with suppress(BadMessage):
-                            self._take(decoder, None)
+                        self._empty(decoder)
                         decoder = None
                     broken = ""
                 elif decoder is None:
@@ -393,6 +392,12 @@ class Video:
                 if broken:
                     raise FrameError(broken)
                 data = bytes(packet.data)
+                if not data:  # it would end the decoder; the next frames tell if they need it
+                    shows_loss = numbers.are_counted or codec_of(packet) == "hevc"
+                    broken = "" if shows_loss and decoder is not None else LOST
+                    self._ready[position] = FrameError("a packet without data")
+                    yield True
+                    continue
                 if decoder is None:
                     decoder, data = self._decoder(packet), self.parameters(position)[1] + data
                     numbers.is_gap(data)
@@ -404,9 +409,7 @@ class Video:
                 self._ready[position] = FrameError.of(error)
                 broken = broken or LOST
             yield True
-        if decoder is not None:
-            with suppress(BadMessage):
-                self._take(decoder, None)
+        self._empty(decoder)
         yield True
 
     def _decoder(self, packet: Picture) -> Any:
@@ -418,8 +421,14 @@ class Video:
         decoder.options = {"max_pixels": str(self._limits.max_pixels)}
         return decoder
 
+    def _empty(self, decoder: Any) -> None:
+        """Take the frames that are left in a decoder, if there is one."""
+        with suppress(BadMessage):
+            if decoder is not None:
+                self._take(decoder, None)
+
     def _take(self, decoder: Any, unit: Any) -> None:
-        """Decode a packet, or empty the decoder, and take the frames that come out."""
+        """Decode a packet, or the end of the video, and take the frames that come out."""
         try:
             frames = decoder.decode(unit)
         except self._av.FFmpegError as error:

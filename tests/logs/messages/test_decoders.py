@@ -28,6 +28,7 @@ from roadeval.logs.messages.pictures import (
     Picture,
     RawPicture,
     Video,
+    codec_of,
     decoder_for,
     is_keyframe,
     message_stamp,
@@ -369,6 +370,23 @@ def test_what_builds_upon_a_packet_that_is_missing_is_lost(codec, counted, lost)
     del left[lost]
     stamps = [left[position].stamp_ns for position in readable(left)]
     assert stamps == [*range(lost), *range(resumed, VIDEO_FRAMES)]
+
+
+@pytest.mark.parametrize("codec", ["h264", "h265", "vp9"])
+def test_an_empty_packet_ends_no_decoder(codec):
+    """Encoders that leave a frame out write such packets; VP9 does not show whether one is lost."""
+    video = numbered(codec, counted=False)
+    video.insert(6, CompressedPicture(99, codec, b""))
+    keys = [n for n in range(6, len(video)) if is_keyframe(video[n])]
+    resumed = keys[0] if codec == "vp9" else 7
+    assert readable(video) == [*range(6), *range(resumed, VIDEO_FRAMES + 1)]
+    with pytest.raises(FrameError, match="a packet without data"):
+        Video(video, Limits()).picture(6)
+
+
+@pytest.mark.parametrize("encoder", ["av1", "libsvtav1", "librav1e", "libaom-av1", "av1_nvenc"])
+def test_a_packet_may_name_its_encoder(encoder):
+    assert codec_of(CompressedPicture(0, encoder, b"")) == "av1"
 
 
 CODECS = [f"made:flavours/fox_pb_CompressedVideo_{codec}.mcap" for codec in ENCODERS]
