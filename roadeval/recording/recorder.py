@@ -26,7 +26,7 @@ from roadeval.data import ERRORS, FINAL_STAGE, IGNORE, TRUTH, FrameResult, Healt
 from roadeval.data.arrays import IGNORED
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT, TESTED
-from roadeval.geometry.plan import Plan
+from roadeval.geometry.ground import Plan
 from roadeval.images.disturbing import Disturbance
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
