@@ -26,8 +26,8 @@ from roadeval.recording.rows import (
     CHUNK_BYTES,
     IMAGES_AND_TEXT,
     NUMBERS,
+    SHARE,
     Batcher,
-    WaitLimits,
     numbers,
     states,
     texts,
@@ -244,7 +244,7 @@ def _recorder(path):
     return Recorder(path, layout())
 
 
-WAIT = WaitLimits(8, 64)
+WAIT = (8, 64)
 
 
 def rows_of(pending):
@@ -268,7 +268,7 @@ def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
     ended = list(run(1000, lambda frame: [("/a", numbers, (frame,))]))
     assert [row for *_, rows in ended for row in rows] == list(range(1000))
     for after, _, rows in ended[:-1]:
-        assert after - rows[0] + 1 == WAIT.after(after + 1)
+        assert after - rows[0] + 1 == min(max((after + 1) // SHARE, 8), 64)
 
 
 def test_an_entity_is_full_by_its_bytes_and_others_wait_on():
