@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from roadeval.cli import arguments, console
 from roadeval.cli.exit_codes import ExitCode
-
-DEFAULT: Final = Path("recordings", "demo.mcap")
 
 
 def demo(
     output: Annotated[
         Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")
-    ] = DEFAULT,
+    ] = Path("recordings", "demo.mcap"),
     quiet: arguments.Quiet = False,
 ) -> int:
     """Write the demo drive: a synthetic road with known truth.
