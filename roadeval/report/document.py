@@ -13,32 +13,21 @@ from roadeval.data import FILTERED, UNFILTERED
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
-from roadeval.report.sections import (
-    classes,
-    disturbances,
-    drive,
-    drives,
-    frames,
-    ground,
-    provenance,
-    rig,
-    slices,
-    summary,
-)
+from roadeval.report.sections import drive, drives, failures, frames, ground, provenance, summary
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.fleet import FleetFolder
 
 ACROSS: Final = 6
 """Number of pictures of worst frames in a row on the page of a fleet."""
 Section = Callable[[Any], Iterable[Block]]
-WHY: Final = (classes.section, slices.when_it_fails, disturbances.section)
+WHY: Final = (failures.classes, failures.when_it_fails, failures.disturbances)
 """The sections on what goes wrong, for a drive or for many."""
 SCORED: Final = (
     *(drive.filter_effect, drive.regions, *WHY, ground.on_the_ground),
     *(drive.stages, drive.thresholds),
 )
 """The sections of a drive with truth; a drive without truth has one section on its masks."""
-RIG: Final = (rig.cameras, drive.filter_effect, disturbances.section, rig.each_camera)
+RIG: Final = (drive.cameras, drive.filter_effect, failures.disturbances, drive.each_camera)
 """The sections of a drive with several cameras."""
 
 

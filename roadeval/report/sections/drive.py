@@ -1,4 +1,4 @@
-"""The sections of one drive: its rates, the filter, regions, stages and thresholds; or masks."""
+"""The sections of one drive: its rates, the filter, regions, stages, thresholds; masks; cameras."""
 
 from __future__ import annotations
 
@@ -7,21 +7,35 @@ from collections.abc import Iterator
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
-from roadeval.data.words import DASH, defined, number, percent, points
+from roadeval.data.words import DASH, defined, number, percent, points, short_names
 from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.tables import merge_names, only, perfect_stages
-from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    Cell,
+    Details,
+    Figure,
+    Heading,
+    ImageGrid,
+    KeepTogether,
+    Table,
+    Text,
+)
 from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import describe_points, figures_over_drive
 from roadeval.report.findings import Findings
 from roadeval.report.images import example_grid, heat_map
+from roadeval.report.sections.failures import when_it_fails
+from roadeval.report.sections.frames import notable_frame
 from roadeval.report.tables import (
     OTHERS,
+    cameras_table,
     differences_table,
+    rates_table,
     stages_table,
     thresholds_table,
     variant_cell,
@@ -244,3 +258,26 @@ def masks(findings: Findings) -> Iterator[Block]:
     yield Text(caption("without truth"))
     if findings.examples:
         yield example_grid(findings.examples)
+
+
+def cameras(findings: Findings) -> Iterator[Block]:
+    """Tabulate ERR of each camera's final masks, and the filter's effect."""
+    yield Heading("Cameras")
+    yield cameras_table(findings.facts)
+
+
+def each_camera(findings: Findings) -> Iterator[Block]:
+    """Yield the verdict, the rates and the worst frame of each camera."""
+    names = short_names([*findings.cameras])
+    for camera, of_camera in findings.cameras.items():
+        facts = of_camera.facts
+        yield Heading(f"Camera {names[camera]}")
+        topic = camera if names[camera] != camera.strip("/") else ""
+        size = f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
+        yield Text(", ".join(filter(None, (topic, size))), "note")
+        yield Text(facts.verdict)
+        if facts.totals:
+            yield Details("Rates of every final mask", [rates_table(facts)])
+        yield from when_it_fails(of_camera, level=2)
+        for frame in of_camera.worst[:1]:
+            yield KeepTogether([*notable_frame(of_camera, frame)])

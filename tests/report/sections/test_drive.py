@@ -39,9 +39,9 @@ from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
 from roadeval.report.sections import drive, drives, summary
 from roadeval.report.sections.drive import filter_effect, over_drive, regions, thresholds
+from roadeval.report.sections.failures import when_it_fails
 from roadeval.report.sections.frames import FrameBrowser, notable_frame, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
-from roadeval.report.sections.slices import when_it_fails
 from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import differences_table, rates_table, stages_table
 from roadeval.results.facts import Facts, FrameAccount, TrainingFacts
