@@ -26,7 +26,6 @@ from roadeval.runtime.sentence import Sentence
 if TYPE_CHECKING:
     import pandas as pd
 
-NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
 """Number of independent frames; with fewer, one drive says little about other frames."""
@@ -111,7 +110,8 @@ def verdict(
     frames drawn at random.
     """
     if not totals:
-        return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
+        nothing = "Nothing to score: no frame with truth was evaluated."
+        return " ".join([nothing, *without_truth(unlabelled)])
     stages = final_stages((variant, stage) for variant, masks in totals.items() for stage in masks)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
