@@ -203,16 +203,15 @@ class FleetRun:
             try:
                 models.append(future.result())
             except Exception as error:  # only the fold's drives fail
-                problem = self._reason(error, f"the model of fold {fold} was trained")
-                models.append(fleet_work.FoldModel(fold, "", problem))
+                models.append(("", self._reason(error, f"the model of fold {fold} was trained")))
         for entry in self.entries:
-            model = models[folds[entry.id]]
-            path = str(training[model.fold].path)
+            fold = folds[entry.id]
+            digest, problem = models[fold]
+            path = str(training[fold].path)
             config = configs[entry.id].override({"training": {"model": path}})
-            how = software(config), model.sha256, model.fold
-            task = DriveTask(self.folder, entry, config, *how)
-            if model.problem:
-                self._fail(task, model.problem)
+            task = DriveTask(self.folder, entry, config, software(config), digest, fold)
+            if problem:
+                self._fail(task, problem)
             else:
                 tasks.append(task)
         return tasks
