@@ -23,8 +23,8 @@ Section = Callable[[Any], Iterable[Block]]
 WHY: Final = (failures.classes, failures.when_it_fails, failures.disturbances)
 """The sections on what goes wrong, for a drive or for many."""
 SCORED: Final = (
-    *(drive.filter_effect, drive.regions, *WHY, ground.on_the_ground),
-    *(drive.stages, drive.thresholds),
+    *(drive.filter_effect, drive.over_time, drive.regions, *WHY, ground.on_the_ground),
+    *(drive.stages, drive.oracles, drive.thresholds),
 )
 """The sections of a drive with truth; a drive without truth has one section on its masks."""
 RIG: Final = (drive.cameras, drive.filter_effect, failures.disturbances, drive.each_camera)
@@ -73,12 +73,13 @@ def page_document(
 
 def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
     of_fleet = isinstance(findings, FleetFolder)
+    first: Section = summary.of_drives if of_fleet else summary.of_a_drive
     return Report(
         kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,
         subtitle=", ".join(_subtitle(findings)),
         footer=", ".join(dict.fromkeys((findings.name, str(findings.path)))),
-        blocks=[*chain.from_iterable(part(findings) for part in (summary.section, *sections))],
+        blocks=[*chain.from_iterable(part(findings) for part in (first, *sections))],
         keywords=[
             *("road recognition", "evaluation", *(["fleet"] if of_fleet else []), findings.name)
         ],

@@ -72,7 +72,7 @@ def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
-    """Yield the effects of the filter and the variants, and how much masks flicker."""
+    """Yield the effects of the filter and the variants."""
     effects = findings.facts.final_effects
     if effects:
         filter_too = "the filter and " * (FILTERED in findings.facts.finals)
@@ -101,10 +101,9 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         legend = caption("filter frame by frame", treated=FILTERED, control=UNFILTERED)
         figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
         yield Details("The filter, frame by frame", [figure])
-    yield from _over_time(findings)
 
 
-def _over_time(findings: Findings) -> Iterator[Block]:
+def over_time(findings: Findings) -> Iterator[Block]:
     """Tabulate the flicker of each final mask and of the truth, and the error episodes."""
     measures = {
         name: measured | measured["episodes"]
@@ -198,10 +197,9 @@ def stages(findings: Findings) -> Iterator[Block]:
     if findings.changes:
         numbers.append(note("repaired and spoiled"))
     yield Details("Every stage in numbers", numbers)
-    yield from _oracles(findings)
 
 
-def _oracles(findings: Findings) -> Iterator[Block]:
+def oracles(findings: Findings) -> Iterator[Block]:
     """Yield the errors that remain if the truth replaces a stage; nothing if not counted."""
     rows = [*perfect_stages(findings.table("oracles"), findings.table("frames"))]
     if not rows:

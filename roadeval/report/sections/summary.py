@@ -30,12 +30,9 @@ STATUSES: Final = {
 }
 
 
-def section(findings: Findings | FleetFolder) -> Iterator[Block]:
-    """Yield the first page."""
+def of_drives(findings: FleetFolder) -> Iterator[Block]:
+    """Yield the first page of a fleet."""
     yield Heading("Summary")
-    if isinstance(findings, Findings):
-        yield from _of_a_drive(findings)
-        return
     facts = findings.facts
     yield Text(facts.verdict, "verdict")
     yield from why(facts)
@@ -52,12 +49,15 @@ def section(findings: Findings | FleetFolder) -> Iterator[Block]:
     yield _beware([*fleet_warnings(findings)])
 
 
-def _of_a_drive(findings: Findings) -> Iterator[Block]:
+def of_a_drive(findings: Findings) -> Iterator[Block]:
+    """Yield the first page of a drive."""
+    yield Heading("Summary")
+    facts = findings.facts
     if not findings.complete:
         yield BulletList("Partial recording", [caption("partial")], "warning")
-    yield Text(findings.facts.verdict, "verdict")
-    for name in dict.fromkeys((findings.facts.focus, *findings.facts.why)):
-        yield from why(findings.facts, name)
+    yield Text(facts.verdict, "verdict")
+    for name in dict.fromkeys((facts.focus, *facts.why)):
+        yield from why(facts, name)
     for frame in findings.worst[:1]:
         title = f"First frame to look at: {frame.frame}"
         if frame.rates:
@@ -65,14 +65,13 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
             title = caption("worst frame", frame=frame.frame, variant=frame.variant, ERR=wrong)
         command = findings.inspect(frame.frame) if findings.inspect else ""
         yield LinkList([(title, f"#frame-{frame.frame}")], command)
-    if findings.facts.totals:
-        yield rates_table(findings.facts)
-    facts = findings.facts
+    if facts.totals:
+        yield rates_table(facts)
     yield Text(account(facts.frames, facts.windows, facts.evaluation.window), "note")
     if findings.thumbnails:
         pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
         legend = caption("thumbnails without truth")
-        if focus := findings.facts.focus:
+        if focus := facts.focus:
             legend = caption("thumbnails", variant=focus, errors=caption("errors"))
         yield ImageGrid(pictures, 4, caption=legend)
     yield _beware([*warnings(findings)])

@@ -415,9 +415,9 @@ def tables(section, fleet):
 
 
 def test_the_first_page_has_the_verdict_the_rates_and_the_differences(fleet):
-    told = opened_blocks(summary.section, fleet)
+    told = opened_blocks(summary.of_drives, fleet)
     assert fleet.facts.verdict in [b.text for b in told if isinstance(b, Text)]
-    rates, effects = tables(summary.section, fleet)
+    rates, effects = tables(summary.of_drives, fleet)
     assert [row[0] for row in plain_rows(rates)] == ["filtered", "unfiltered", "blind"]
     first, *others = (own["post"] for own in fleet.facts.totals.values())
     assert plain_rows(rates)[0][1:4] == ["10", "200", f"{100 * first['ERR']:.2f}"]
