@@ -14,7 +14,7 @@ import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, first_of, number, percent, points
-from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.scoreboard import BASES, Effect
 from roadeval.evaluation.tables import finals, group_rows, only, values_of
 from roadeval.report.blocks import (
@@ -46,8 +46,6 @@ OF_ONE_REASON: Final = 4
 """Greatest number of drives that are named for one reason."""
 TAGS: Final = 48
 """Greatest number of letters of a drive's tags."""
-_WORDS: Final = ("drive", "state", "group", "tags")
-_SHOWN: Final = (TESTED, "FPR", "FNR")
 
 
 def plots(findings: FleetFolder) -> Iterator[Block]:
@@ -157,7 +155,7 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "group": rows["group"].astype(object).fillna("").tolist(),
         "tags": [tags.get(drive, "") for drive in rows.index],
         "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
-        **{rate: [*map(percent, scores[rate])] for rate in _SHOWN},
+        **{rate: [*map(percent, scores[rate])] for rate in SHORT},
     }
     for base in BASES:  # differences of the focus, if it has any, or of another variant
         effects = only(findings.effects, base=base)
@@ -169,10 +167,11 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     unused = [title for title in ("group", "tags") if not any(columns[title])]
     unused += [] if worst is None else ["state", "group"]
     columns = {title: cells for title, cells in columns.items() if title not in unused}
+    words = ("drive", "state", "group", "tags")
     return Table(
         [*columns],
         [*zip(*columns.values(), strict=True)],
-        text_columns=[place for place, title in enumerate(columns) if title in _WORDS],
+        text_columns=[place for place, title in enumerate(columns) if title in words],
         small=True,
     )
 
