@@ -27,8 +27,8 @@ from roadeval.logs.truth.picks import IMAGES, LABELS, PROPOSALS
 from roadeval.logs.truth.shapes import Proposal
 from roadeval.results.facts import is_fleet
 from roadeval.results.folder import RUN
-from roadeval.results.labels import describe_annotator, describe_suspect, describe_suspects
 from roadeval.results.rows import records
+from roadeval.results.sentences import describe_annotator, describe_suspect, describe_suspects
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import AnyPath, put, writing
 from roadeval.runtime.text import visible
