@@ -30,7 +30,7 @@ from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member, Origin
 from roadeval.results.fleet import FleetWriter, made_path
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.files import AnyPath, Paths, is_claimed, list_paths, reading, sha256_of
+from roadeval.runtime.files import AnyPath, Paths, is_claimed, reading, sha256_of
 from roadeval.runtime.repository import current_commit
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
@@ -88,7 +88,7 @@ def replay_fleet(
         Called in the caller's thread whenever a drive is done.
     """
     commit, config = current_commit(), (config or RunConfig()).resolved()
-    entries = find_drives([str(drive) for drive in list_paths(drives)])
+    entries = find_drives(drives)
     if config.cameras:
         entries = name_cameras(
             [camera for entry in entries for camera in entry.of_cameras(config.cameras)]
