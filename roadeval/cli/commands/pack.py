@@ -11,7 +11,7 @@ from roadeval.cli.exit_codes import ExitCode
 
 def pack(
     images: Annotated[Path, arguments.argument("IMAGES", "Images, a video, or kitti/training.")],
-    output: Annotated[Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")],
+    output: arguments.NewLog,
     *,
     truth: Annotated[
         Path | None, arguments.option("--truth", "Folder of masks, paired by name.", "MASKS")

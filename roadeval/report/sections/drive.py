@@ -185,7 +185,7 @@ def stages(findings: Findings) -> Iterator[Block]:
             [
                 variant_cell(variant, [*findings.facts.totals]),
                 *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
-                percent(findings.total(variant)[TESTED]),
+                percent(findings.facts.final_totals[variant][TESTED]),
             ]
             for variant, parts in findings.error_parts.items()
         ],
@@ -228,7 +228,7 @@ def oracles(findings: Findings) -> Iterator[Block]:
     totals = findings.facts.totals
     for row in rows if {FILTERED, UNFILTERED} <= totals.keys() else ():
         is_filter = row["variant"] == FILTERED and row["oracle"] not in totals[FILTERED]
-        without = findings.total(UNFILTERED)
+        without = findings.facts.final_totals[UNFILTERED]
         if is_filter and row["frames"] == without["frames"]:
             helps = row[TESTED] <= without[TESTED]
             meaning = caption("perfect filter helps" if helps else "perfect filter harms")

@@ -160,7 +160,7 @@ def errors_by_variant(facts: Facts | FleetFacts) -> dict[str, dict[str, float | 
     columns: dict[str, dict[str, float | None]] = {}
     texts = [c.text for changes in facts.disturbances.values() for c in changes.values()]
     for name, changes in facts.disturbances.items():
-        columns[name] = {"none": facts.totals[name][facts.finals[name]][TESTED]}
+        columns[name] = {"none": facts.final_totals[name][TESTED]}
         columns[name] |= dict.fromkeys(texts) | {c.text: c.ERR for c in changes.values()}
     return columns
 

@@ -101,11 +101,9 @@ def warnings(findings: Findings) -> Iterator[str]:
     trained_here = facts.training.model is None or facts.training.adapted
     if facts.training.source == "truth" and trained_here and findings.facts.totals:
         yield caption("trained on this drive")
-    errors = {name: findings.total(name)[TESTED] for name in findings.facts.finals}
-    if worse := _worse_than_baseline(errors):
+    if worse := _worse_than_baseline(facts):
         yield caption("worse than blind", worse=worse)
-    for variant in findings.facts.finals:
-        total = findings.total(variant)
+    for variant, total in facts.final_totals.items():
         if rates := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
             frames, rates_named = number(total["frames"]), listing(rates)
             yield caption("undefined rates", variant=variant, frames=frames, rates=rates_named)
@@ -116,8 +114,9 @@ def warnings(findings: Findings) -> Iterator[str]:
         yield caption("no pictures")
 
 
-def _worse_than_baseline(errors: Mapping[str, float | None]) -> str:
+def _worse_than_baseline(facts: Facts | FleetFacts) -> str:
     """Name the variants with a higher ERR than the baseline; empty without any."""
+    errors = {name: total[TESTED] for name, total in facts.final_totals.items()}
     blind = errors.get(BASELINE)
     if not defined(blind):
         return ""
@@ -137,8 +136,7 @@ def fleet_warnings(findings: FleetFolder) -> Iterator[str]:
     trained_here = (drives["evaluated"] > 0) & (drives["trained_on"] > 0) & drives["model"].isna()
     if count := int(trained_here.sum()):
         yield caption("drives that trained their models", drives=_were(count))
-    errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
-    if worse := _worse_than_baseline(errors):
+    if worse := _worse_than_baseline(facts):
         yield caption("worse than blind in a fleet", worse=worse)
     yield from (f"{sentence}." for sentence in facts.warnings)
 
