@@ -273,7 +273,7 @@ def _write_picks(
             name = f"{frame.stamp_ns:019d}.png"
             (folder / IMAGES / name).write_bytes(png_of(recording.image(frame.frame)))
             proposals.append(Proposal(name, mask))
-        for name, content in proposal_files(proposals, labels).items():
+        for name, content in proposal_files(proposals, labels).items() if new else ():
             path = folder / PROPOSALS / name
             wave = new[0][0].wave if path.exists() else ""
             path.with_name(f"{wave}{name}").write_bytes(content)
