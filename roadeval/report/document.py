@@ -13,7 +13,7 @@ from roadeval.data import FILTERED, UNFILTERED
 from roadeval.data.words import number
 from roadeval.report.blocks import Block, Report
 from roadeval.report.findings import Findings
-from roadeval.report.sections import drive, drives, failures, frames, ground, provenance, summary
+from roadeval.report.sections import drive, drives, failures, frames, ground
 from roadeval.report.sections.frames import FrameBrowser
 from roadeval.results.fleet import FleetFolder
 
@@ -35,13 +35,13 @@ def document(findings: Findings | FleetFolder) -> Report:
     """Return the report of a drive, or of many."""
     if isinstance(findings, FleetFolder):
         parts: tuple[Section, ...] = (drives.plots, drives.strata, drive.regions, *WHY)
-        return _compose(findings, *parts, drives.missing, drives.worst, provenance.of_drives)
+        return _compose(findings, *parts, drives.missing, drives.worst, drives.provenance)
     if findings.cameras:
-        return _compose(findings, *RIG, provenance.section)
+        return _compose(findings, *RIG, drive.provenance)
     # Frames fill pages, so they come late.
     scored = (drive.over_drive, *SCORED) if findings.facts.totals else (drive.masks,)
     gallery = (frames.worst_frames,) if findings.facts.totals or findings.worst else ()
-    return _compose(findings, *scored, *gallery, provenance.section)
+    return _compose(findings, *scored, *gallery, drive.provenance)
 
 
 def page_document(
@@ -60,20 +60,20 @@ def page_document(
         worst = partial(drives.worst, across=ACROSS, most=worst_frames)
         parts: tuple[Section, ...] = (drives.table, along, worst, drives.plots, drives.strata)
         parts = (*parts, drive.regions, *WHY, drives.missing)
-        return _compose(findings, *parts, provenance.of_drives)
+        return _compose(findings, *parts, drives.provenance)
     if findings.cameras:
-        return _compose(findings, *RIG, provenance.section)
+        return _compose(findings, *RIG, drive.provenance)
     if browsed and browsed.film:  # the film shows more than the thumbnails
         findings = replace(findings, thumbnails=())
     parts = (drive.masks,)
     if findings.facts.totals:
         parts = (partial(drive.over_drive, heading=False), *SCORED)
-    return _compose(findings, lambda _: frames.browser(browsed), *parts, provenance.section)
+    return _compose(findings, lambda _: frames.browser(browsed), *parts, drive.provenance)
 
 
 def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
     of_fleet = isinstance(findings, FleetFolder)
-    first: Section = summary.of_drives if of_fleet else summary.of_a_drive
+    first: Section = drives.summary if of_fleet else drive.summary
     return Report(
         kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
         title=findings.name,

@@ -19,7 +19,6 @@ from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
 from roadeval.report.sections import failures
 from roadeval.report.sections.ground import distance_table, kitti_table
-from roadeval.report.sections.summary import why
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction
@@ -95,7 +94,7 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
         yield distance_table(metres, [*facts.finals], brief=True)
     if facts.kitti:
         yield kitti_table(facts)
-    yield from why(facts)
+    yield from failures.why(facts)
 
 
 def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:

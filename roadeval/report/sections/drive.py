@@ -1,13 +1,24 @@
-"""The sections of one drive: its rates, the filter, regions, stages, thresholds; masks; cameras."""
+"""The sections of one drive, from its first page to the command that makes it again."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
-from roadeval.data.words import DASH, defined, number, percent, points, short_names
+from roadeval.data.words import (
+    DASH,
+    UNSET,
+    defined,
+    listing,
+    number,
+    percent,
+    points,
+    setting,
+    short_names,
+)
 from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
@@ -15,12 +26,15 @@ from roadeval.evaluation.regions import titles
 from roadeval.evaluation.tables import merge_names, only, perfect_stages
 from roadeval.report.blocks import (
     Block,
+    BulletList,
     Cell,
+    Command,
     Details,
     Figure,
     Heading,
     ImageGrid,
     KeepTogether,
+    LinkList,
     Table,
     Text,
 )
@@ -28,8 +42,8 @@ from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import describe_points, figures_over_drive
 from roadeval.report.findings import Findings
-from roadeval.report.images import example_grid, heat_map
-from roadeval.report.sections.failures import when_it_fails
+from roadeval.report.images import example_grid, heat_map, jpeg
+from roadeval.report.sections.failures import beware, when_it_fails, why, worse_than_baseline
 from roadeval.report.sections.frames import notable_frame
 from roadeval.report.tables import (
     OTHERS,
@@ -41,7 +55,58 @@ from roadeval.report.tables import (
     variant_cell,
 )
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.sentences import CLAIMED, correction
+from roadeval.results.sentences import CLAIMED, account, correction
+
+LOSSES: Final = 3
+"""Greatest number of losses that are named."""
+
+
+def summary(findings: Findings) -> Iterator[Block]:
+    """Yield the first page of a drive."""
+    yield Heading("Summary")
+    facts = findings.facts
+    if not findings.complete:
+        yield BulletList("Partial recording", [caption("partial")], "warning")
+    yield Text(facts.verdict, "verdict")
+    for name in dict.fromkeys((facts.focus, *facts.why)):
+        yield from why(facts, name)
+    for frame in findings.worst[:1]:
+        title = f"First frame to look at: {frame.frame}"
+        if frame.rates:
+            wrong = percent(frame.rates[frame.variant][TESTED], 1)
+            title = caption("worst frame", frame=frame.frame, variant=frame.variant, ERR=wrong)
+        command = findings.inspect(frame.frame) if findings.inspect else ""
+        yield LinkList([(title, f"#frame-{frame.frame}")], command)
+    if facts.totals:
+        yield rates_table(facts)
+    yield Text(account(facts.frames, facts.windows, facts.evaluation.window), "note")
+    if findings.thumbnails:
+        pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
+        legend = caption("thumbnails without truth")
+        if focus := facts.focus:
+            legend = caption("thumbnails", variant=focus, errors=caption("errors"))
+        yield ImageGrid(pictures, 4, caption=legend)
+    yield beware([*warnings(findings)])
+
+
+def warnings(findings: Findings) -> Iterator[str]:
+    """Yield the reasons to doubt the numbers of a drive."""
+    facts = findings.facts
+    yield from facts.warnings
+    trained_here = facts.training.model is None or facts.training.adapted
+    if facts.training.source == "truth" and trained_here and findings.facts.totals:
+        yield caption("trained on this drive")
+    if worse := worse_than_baseline(facts):
+        yield caption("worse than blind", worse=worse)
+    for variant, total in facts.final_totals.items():
+        if rates := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
+            frames, rates_named = number(total["frames"]), listing(rates)
+            yield caption("undefined rates", variant=variant, frames=frames, rates=rates_named)
+    yield from (f"Lost: {loss}" for loss in facts.losses[:LOSSES])
+    if len(facts.losses) > LOSSES:
+        yield caption("more losses", count=len(facts.losses) - LOSSES)
+    if not findings.pictured:
+        yield caption("no pictures")
 
 
 def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
@@ -279,3 +344,60 @@ def each_camera(findings: Findings) -> Iterator[Block]:
         yield from when_it_fails(of_camera, level=2)
         for frame in of_camera.worst[:1]:
             yield KeepTogether([*notable_frame(of_camera, frame)])
+
+
+def provenance(findings: Findings) -> Iterator[Block]:
+    """Yield the log, the methods and the command that makes the results again."""
+    facts = findings.facts
+    yield Heading("How to reproduce this")
+    if facts.log:
+        digest = Text(f"Digest of its index and checksums: {facts.log.digest}")
+        again = [Command(findings.again), note("reproduced")] if findings.again else []
+        yield KeepTogether([Text(f"Log: {facts.log.path}"), digest, *again])
+    for name, labels in facts.masks.items():
+        yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
+    # Stages, such as networks, describe themselves.
+    for variant, stages in facts.methods.items():
+        for stage, description in stages.items():
+            rows = dict(flatten(description))
+            if (seconds := facts.seconds.get(variant, {}).get(stage)) is not None:
+                rows["ms a frame"] = f"{1e3 * seconds:.2f}"
+            yield Details(f"{variant}: {stage}", [_words(["what", "value"], [*rows.items()])])
+    details: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
+    # The log's digest and the settings above tell more than the digest of the input.
+    properties = [
+        f"{name}: {value}"
+        for name, value in findings.properties.items()
+        if name != "input" and value != ""
+    ]
+    if properties:
+        details.append(Text("; ".join(properties), "note"))
+    if facts.versions:
+        details.append(_words(["package", "version"], [*facts.versions.items()]))
+    if facts.seconds:
+        times = [
+            [variant, stage, f"{1e3 * seconds:.2f}"]
+            for variant, stages in facts.seconds.items()
+            for stage, seconds in stages.items()
+        ]
+        details.append(_words(["variant", "stage", "ms a frame"], times))
+    if details:
+        yield Details("Topics, versions, milliseconds", details, on_paper=False)
+
+
+def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Return a small table with words in its first two columns."""
+    return Table(columns, rows, text_columns=(0, 1), small=True)
+
+
+def flatten(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield settings that have a value, by their dotted names.
+
+    >>> list(flatten({"svm": {"kernel": "rbf"}, "size": [4, 3], "seed": None}))
+    [('svm.kernel', 'rbf'), ('size', '4, 3')]
+    """
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from flatten(value, f"{prefix}{name}.")
+        elif (text := setting(value)) != UNSET:
+            yield f"{prefix}{name}", text

@@ -1,16 +1,27 @@
-"""Where a mask fails: classes taken for road, conditions that are confirmed, and disturbances."""
+"""Where a mask fails, and why: classes taken for road, confirmed conditions, disturbances."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Final
 
-from roadeval.data.words import in_percent, number, percent, points
+from roadeval.data import BASELINE
+from roadeval.data.words import defined, in_percent, listing, number, percent, points
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.stats.difference import LEAST_GROUPS
 from roadeval.evaluation.stats.slices import LEAST_FRAMES
 from roadeval.evaluation.tables import by_class, only
-from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, KeepTogether, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Details,
+    Figure,
+    Heading,
+    KeepTogether,
+    Table,
+    Text,
+)
 from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart, ChartKind, looks
 from roadeval.report.charts.standard import OF_CLASSES, regions, series
@@ -173,3 +184,31 @@ def brief(facts: Facts | FleetFacts) -> Iterator[Block]:
         rows = [[text, *row] for text, row in zip(names, cells, strict=True)]
         legend = caption("disturbances")
         yield Table(["disturbed by", *columns], rows, text_columns=(0,), caption=legend, small=True)
+
+
+def why(facts: Facts | FleetFacts, variant: str | None = None) -> Iterator[BulletList]:
+    """Yield the reasons for the errors of a variant, by default the focus, if there are any.
+
+    Paper shows only the reasons of the focus; a page shows the reasons of the chosen focus.
+    """
+    name = variant or facts.focus or ""
+    if reasons := facts.why.get(name):
+        is_focus = name == facts.focus
+        yield BulletList(f"Why {name} errs", reasons, focus=name, on_paper=is_focus)
+
+
+def worse_than_baseline(facts: Facts | FleetFacts) -> str:
+    """Name the variants with a higher ERR than the baseline; empty without any."""
+    errors = {name: total[TESTED] for name, total in facts.final_totals.items()}
+    blind = errors.get(BASELINE)
+    if not defined(blind):
+        return ""
+    worse = [name for name, error in errors.items() if defined(error) and error > blind]
+    verb = "is" if len(worse) == 1 else "are"
+    return f"{listing(worse)} {verb} worse than {BASELINE} (ERR {percent(blind)} %)" * bool(worse)
+
+
+def beware(sentences: list[str]) -> BulletList:
+    """Return a list of warnings, or a line if there is none."""
+    tone = "warning" if sentences else "plain"
+    return BulletList("Beware", sentences or [caption("nothing known")], tone)
