@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -72,38 +72,31 @@ def page_document(
 
 
 def _compose(findings: Findings | FleetFolder, *sections: Section) -> Report:
-    of_fleet = isinstance(findings, FleetFolder)
-    first: Section = drives.summary if of_fleet else drive.summary
+    preset, kicker, words = findings.facts.run.get("preset"), "roadeval report", list[str]()
+    if isinstance(findings, FleetFolder):
+        first: Section = drives.summary
+        kicker, words = f"{kicker} of a fleet", ["fleet"]
+        ran, version = {*findings.facts.finals}, findings.facts.version
+        about = [f"{number(len(findings.facts.drives))} drives"]
+        about.append(f"{number(findings.facts.frames)} frames evaluated")
+    else:
+        first, facts = drive.summary, findings.facts
+        ran, version = {*facts.settings}, facts.versions.get("roadeval", "")
+        about = [f"{len(findings.cameras)} cameras"] if findings.cameras else []
+        about.append(f"{facts.frames.in_log or facts.frames.evaluated} frames")
+        if facts.drive.width:
+            about.append(f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}")
+        if facts.drive.rate_hz:
+            about.append(f"{facts.drive.rate_hz:.4g} Hz")
+    if preset and {FILTERED, UNFILTERED} & ran:  # else no variant used the preset
+        about.append(f"preset {preset}")
+    if version:
+        about.append(f"roadeval {version}")
     return Report(
-        kicker="roadeval report of a fleet" if of_fleet else "roadeval report",
+        kicker=kicker,
         title=findings.name,
-        subtitle=", ".join(_subtitle(findings)),
+        subtitle=", ".join(about),
         footer=", ".join(dict.fromkeys((findings.name, str(findings.path)))),
         blocks=[*chain.from_iterable(part(findings) for part in (first, *sections))],
-        keywords=[
-            *("road recognition", "evaluation", *(["fleet"] if of_fleet else []), findings.name)
-        ],
+        keywords=["road recognition", "evaluation", *words, findings.name],
     )
-
-
-def _subtitle(findings: Findings | FleetFolder) -> Iterator[str]:
-    preset = findings.facts.run.get("preset")
-    ran = findings.facts.finals if isinstance(findings, FleetFolder) else findings.facts.settings
-    if isinstance(findings, FleetFolder):
-        version = findings.facts.version
-        yield f"{number(len(findings.facts.drives))} drives"
-        yield f"{number(findings.facts.frames)} frames evaluated"
-    else:
-        facts = findings.facts
-        version = facts.versions.get("roadeval", "")
-        if findings.cameras:
-            yield f"{len(findings.cameras)} cameras"
-        yield f"{facts.frames.in_log or facts.frames.evaluated} frames"
-        if facts.drive.width:
-            yield f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
-        if facts.drive.rate_hz:
-            yield f"{facts.drive.rate_hz:.4g} Hz"
-    if preset and {FILTERED, UNFILTERED} & {*ran}:  # else no variant used the preset
-        yield f"preset {preset}"
-    if version:
-        yield f"roadeval {version}"
