@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -141,7 +141,7 @@ class Survey:
         return [pack((cells >> digit) & 1) for cells in self._cells for digit in digits]
 
     @cached_property
-    def _lines(self) -> list[Line]:
+    def _lines(self) -> list[_Line]:
         """The lines on which the ends of the road are searched, for each stance.
 
         One line crosses the road at each distance; the last one runs straight ahead.
@@ -158,16 +158,16 @@ class Survey:
             lines.append(self._line(ground, np.column_stack([ahead, 0 * ahead]), ahead))
         return lines
 
-    def _line(self, ground: Ground, places: Floats, along: Floats) -> Line:
+    def _line(self, ground: Ground, places: Floats, along: Floats) -> _Line:
         seen = pixels_of(ground, places)
         inside: Pixels = np.flatnonzero(seen != OUTSIDE)
         if not len(inside):
-            return np.zeros(0, np.intp), [0.0]
+            return _Line(np.zeros(0, np.intp), [0.0])
         part = slice(inside[0], inside[-1] + 1)
         seen, along = seen[part], along[part]
         steps = np.flatnonzero(np.diff(seen)) + 1
         borders = np.concatenate([along[:1], (along[steps - 1] + along[steps]) / 2, along[-1:]])
-        return seen[np.concatenate([[0], steps])], borders.tolist()
+        return _Line(seen[np.concatenate([[0], steps])], borders.tolist())
 
     def ends(self, masks: Bits, truth: TruthBits) -> Floats:
         """Return where masks and the truth end, ``(K, S, M, 2)`` metres, see `FrameMetres.ends`.
@@ -177,17 +177,17 @@ class Survey:
         pixels without truth, has no end there. Ahead, no road ends beyond the labelled pixels.
         """
         lines, places = self._lines, len(self._settings.edges_at) + 1
-        crossed = np.concatenate([pixels for pixels, _ in lines])
+        crossed = np.concatenate([line.pixels for line in lines])
         stacked = np.concatenate([[truth.road, truth.labelled], masks])
         flags = np.unpackbits(
             stacked.view(np.uint8), axis=2, count=self._shape[1], bitorder="little"
         )
         taken = flags.reshape(len(flags), -1).take(crossed, axis=1)
-        ends = np.cumsum([len(pixels) for pixels, _ in lines])
+        ends = np.cumsum([len(line.pixels) for line in lines])
         road, labelled, *mask_runs = (_runs(flags_of_lines, ends) for flags_of_lines in taken)
         found_ends = np.full((len(masks), len(lines), 2, 2), np.nan)
-        for number, (pixels, borders) in enumerate(lines):
-            with_truth = labelled[number]
+        for number, line in enumerate(lines):
+            with_truth, borders = labelled[number], line.borders
             if number % places == places - 1:
                 start, nothing, cap = 0, math.nan, math.nan
                 if with_truth:
@@ -201,7 +201,7 @@ class Survey:
                 continue
             *sides, middle = _sides(road[number], with_truth, borders, 0.0)
             found_ends[:, number, :, 1] = sides
-            line_run = [(0, len(pixels))]
+            line_run = [(0, len(line.pixels))]
             for place, runs in enumerate(mask_runs):
                 *sides, _ = _sides(runs[number], line_run, borders, middle)
                 found_ends[place, number, :, 0] = sides
@@ -215,8 +215,14 @@ def survey_of(ground: Ground, settings: EvaluationSettings, shape: tuple[int, in
     return Survey(ground.scaled(shape[1], shape[0]), settings)
 
 
-Line = tuple[Pixels, list[float]]
-"""The pixels that a line on the ground crosses, and their ends: ``(n + 1)`` metres along it."""
+class _Line(NamedTuple):
+    """A line on the ground: the pixels that it crosses, and where it enters and leaves them."""
+
+    pixels: Pixels
+    borders: list[float]
+    """``(n + 1)`` metres along the line: the ends of its pixels."""
+
+
 Runs = list[tuple[int, int]]
 """The first pixel of each stretch on a line, and the pixel after its last."""
 

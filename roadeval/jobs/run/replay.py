@@ -135,9 +135,8 @@ def _replay_log(
         drawn = _record_frames(
             runs, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
         )
-        ended = {run.camera: _sum_up(run, results, drawn[run.camera]) for run in runs}
-        metres = tuple(runs[0].board.metres()) if len(runs) == 1 else ()
-        facts = _finish_recording(ended, recorder, results, config)
+        ended = [_sum_up(run, results, drawn[run.camera]) for run in runs]
+        facts = _finish_recording(runs, ended, recorder, results, config)
         if sidecar:
             sidecar.finish()
         tracebacks = tuple(text for run in runs for text in run.failures.tracebacks())
@@ -148,29 +147,35 @@ def _replay_log(
 
             with results.explain_errors():
                 names = short_names([*cameras])
-                for camera, (_, sums, _) in ended.items():
-                    windows, examples = sums.windows, drawn[camera]
+                for camera, camera_result in zip(cameras, ended, strict=True):
+                    windows, examples = camera_result.sums.windows, drawn[camera]
                     write_figures(results.folder, log.name, windows, examples, names[camera])
         facts = replace(facts, origin=Origin(time.time_ns(), *commit, {**config.output.labels}))
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
-    (_, sums, _), *others = ended.values()
-    of_focus = finals(only(sums.frames, variant=facts.focus or ""))
+    of_focus = finals(only(ended[0].sums.frames, variant=facts.focus or ""))
     files = [paths.reports / name for name in facts.files] + ([paths.mcap] if paths.mcap else [])
     return Outcome(
         *(paths.recording, paths.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
         tuple(files),
         tracebacks=tracebacks,
-        metres=metres,
-        errors=() if others else tuple(of_focus[TESTED].dropna()),
+        metres=ended[0].metres if len(ended) == 1 else (),
+        errors=tuple(of_focus[TESTED].dropna()) if len(ended) == 1 else (),
         traffic=log.traffic,
     )
 
 
-CameraResult = tuple[Facts, DriveSums, Mapping[str, str]]
-"""The results of a camera's run, and their texts as the recording keeps them."""
+@dataclass(frozen=True, eq=False)
+class _CameraResult:
+    """The results of a camera's run."""
+
+    facts: Facts
+    sums: DriveSums
+    texts: Mapping[str, str]
+    """Texts of its results, as the recording keeps them."""
+    metres: tuple[Mapping[str, Any], ...]
 
 
-def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> CameraResult:
+def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) -> _CameraResult:
     """Sum up a camera's run, and add the sums to the tables."""
     import pandas as pd
 
@@ -183,7 +188,7 @@ def _sum_up(run: Run, results: ResultsWriter, examples: Sequence[ExampleFrame]) 
     of_classes = [(*run.key, *row) for row in rows["classes"]]
     classes = pd.DataFrame(of_classes, columns=[*TABLES["classes"].names])
     facts = replace(facts, why=explain(facts, classes))
-    return facts, sums, _recorded_texts(run, facts, lines)
+    return _CameraResult(facts, sums, _recorded_texts(run, facts, lines), tuple(run.board.metres()))
 
 
 def recorder_for(
@@ -199,20 +204,21 @@ def recorder_for(
 
 
 def _finish_recording(
-    ended: Mapping[str, CameraResult],
+    runs: Sequence[Run],
+    ended: Sequence[_CameraResult],
     recorder: Recorder | None,
     results: ResultsWriter,
     config: RunConfig,
 ) -> Facts:
     """Finish the recording, and return the facts of all cameras together."""
-    if len(ended) == 1:
-        ((facts, _, texts),) = ended.values()
+    if len(runs) == 1:
         if recorder:
-            recorder.finish(texts)
-        return facts
-    frames = concatenate([sums.frames for _, sums, _ in ended.values()])
-    disturbed = concatenate([sums.disturbed for _, sums, _ in ended.values()])
-    camera_facts = {name: facts for name, (facts, _, _) in ended.items()}
+            recorder.finish(ended[0].texts)
+        return ended[0].facts
+    by_camera = {run.camera: camera_result for run, camera_result in zip(runs, ended, strict=True)}
+    frames = concatenate([camera_result.sums.frames for camera_result in ended])
+    disturbed = concatenate([camera_result.sums.disturbed for camera_result in ended])
+    camera_facts = {name: camera_result.facts for name, camera_result in by_camera.items()}
     facts = summary.join_cameras(frames, disturbed, camera_facts, results.tables)
     if recorder is None:
         return facts
@@ -220,8 +226,8 @@ def _finish_recording(
     steady = {name: replace(facts, seconds={}) for name, facts in camera_facts.items()}
     recorded = replace(facts, run=deciding(config).as_dict(), cameras=steady)
     toml = run_toml(deciding(config), facts.drive.name, VERSION)
-    texts_of = {name: texts for name, (_, _, texts) in ended.items()}
-    recorder.finish({"summary": recorded.text(), "run": toml}, by_camera=texts_of)
+    texts = {name: camera_result.texts for name, camera_result in by_camera.items()}
+    recorder.finish({"summary": recorded.text(), "run": toml}, by_camera=texts)
     return facts
 
 
