@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages
-from roadeval.cli.exit_codes import ExitCode
 
 
 def pack(
@@ -40,4 +39,4 @@ def pack(
     if not quiet:
         masks = f", {packed.labelled} with a mask" if packed.labelled else ""
         console.say(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
-    return ExitCode.DONE
+    return messages.losses(packed.losses)
