@@ -228,6 +228,18 @@ def test_no_wait_for_a_hung_disk_is_without_end(drive, tmp_path, monkeypatch, hu
     assert time.monotonic() - begun < 10
 
 
+def test_a_call_of_rerun_that_fails_says_why(tmp_path, monkeypatch):
+    def refuse(*_args, **_options):
+        raise ValueError("no such\nview")
+
+    monkeypatch.setattr(rr.RecordingStream, "save", refuse)
+    with (
+        pytest.raises(RecordingError, match="written any further: no such view"),
+        _recorder(tmp_path / "out.rrd"),
+    ):
+        pass
+
+
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(RecordingError, match="cannot be written"), _recorder(tmp_path / "file/out"):
