@@ -29,6 +29,7 @@ def argument(metavar: str, text: str) -> Any:
 
 
 Drive = Annotated[str, argument("DRIVE", "A camera log (MCAP), or its URL.")]
+NewLog = Annotated[Path, option("-o --output", "File of the log.", "DRIVE.mcap")]
 Result = Annotated[str, argument("RESULT", "A recording, a results folder, a fleet, or a URL.")]
 LabelFormat = Annotated[
     Literal["png", "coco"], option("--format", "Format of the labels to correct.")

@@ -58,15 +58,11 @@ class MethodSettings:
         str | None, Flag("--preset", "paper|printed|printed_order|hsi|gated|robust")
     ] = None
     config: Annotated[Path | None, Flag("--config", "FILE.toml")] = None
-    variants: Annotated[Mapping[str, str | None], Flag("--variant", "NAME=FILE|PRESET")] = (
-        dataclasses.field(default_factory=dict)
+    variants: Annotated[Mapping[str, str | None] | None, Flag("--variant", "NAME=FILE|PRESET")] = (
+        None
     )
-    nets: Annotated[Mapping[str, str], Flag("--net", "NAME=FILE")] = dataclasses.field(
-        default_factory=dict
-    )
-    masks: Annotated[Mapping[str, str], Flag("--masks", "NAME=PATH")] = dataclasses.field(
-        default_factory=dict
-    )
+    nets: Annotated[Mapping[str, str] | None, Flag("--net", "NAME=FILE")] = None
+    masks: Annotated[Mapping[str, str] | None, Flag("--masks", "NAME=PATH")] = None
     tunes: Annotated[tuple[str, ...], Flag("--tune", "NAME")] = ()
     only: Annotated[tuple[str, ...], Flag("--only", "NAME")] = ()
     cameras: Annotated[tuple[str, ...], Flag("--image-topic", "T", "Input")] = ()

@@ -13,6 +13,8 @@ DASH: Final = "\N{EN DASH}"
 MINUS: Final = "\N{MINUS SIGN}"
 UNSET: Final = "not given"
 """The text of a setting without a value."""
+BARS: Final = "▁▂▃▄▅▆▇█"
+"""Bars of a chart in a line of text, the lowest first."""
 
 
 def defined(number: float | None) -> TypeGuard[float]:

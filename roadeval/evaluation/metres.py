@@ -17,8 +17,7 @@ import numpy.typing as npt
 from roadeval.data import CODES, NON_ROAD, ROAD, Histogram, Probability, Truth
 from roadeval.data.arrays import Bits, Floats, Plane, Sums, TruthBits, pack, unpack
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.geometry.ground import Ground
-from roadeval.geometry.plan import OUTSIDE, Plan, pixels_of
+from roadeval.geometry.ground import OUTSIDE, Ground, Plan, pixels_of
 
 STANCES: Final = ((0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -0.05), (0.0, 0.05))
 """Stances of the camera, the calibrated one first: degrees further down, and metres higher."""

@@ -31,7 +31,7 @@ from roadeval.data.words import short_names
 from roadeval.errors import RoadevalError
 from roadeval.logs.files import METADATA, files_of, natural
 from roadeval.logs.settings import CameraSettings, LogConfig
-from roadeval.runtime.files import reading, sha256_of
+from roadeval.runtime.files import Paths, list_paths, reading, sha256_of
 from roadeval.runtime.settings import Checked
 from roadeval.runtime.text import public_url, visible, without_secrets
 
@@ -300,7 +300,7 @@ MANIFEST: Final = ".toml"
 """The ending of a manifest's name."""
 
 
-def find_drives(words: Sequence[str]) -> list[DriveEntry]:
+def find_drives(words: Paths) -> list[DriveEntry]:
     """Return the drives that some words name, in their order.
 
     A word is a log (a file of any name), a rosbag2 folder, a folder that is searched for logs and
@@ -313,7 +313,7 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
     first_of: dict[tuple[str, str], DriveEntry] = {}
     bare: tuple[Any, ...] = (None, {}, {})
     entries: list[DriveEntry] = []
-    for word in words:
+    for word in map(str, list_paths(words)):
         with reading(visible(word), FleetError):
             path = Path(word)
             if is_url(word) or path.suffix != MANIFEST or not path.is_file():

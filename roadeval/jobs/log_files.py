@@ -66,6 +66,7 @@ def pack(
 ) -> PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
+    The readable frames of a damaged video are packed; ``losses`` says what is not.
     A `RoadevalError` if there is nothing to pack, a file is unreadable, or no mask belongs to an
     image.
 

@@ -28,8 +28,7 @@ from roadeval.data import (
 from roadeval.data.colours import CLEAR, SHADOW
 from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
-from roadeval.geometry.ground import Ground
-from roadeval.geometry.plan import Plan
+from roadeval.geometry.ground import Ground, Plan
 from roadeval.runtime.documents import read_json
 
 APPLICATION: Final = "roadeval"

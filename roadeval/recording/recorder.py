@@ -26,7 +26,7 @@ from roadeval.data import ERRORS, FINAL_STAGE, IGNORE, TRUTH, FrameResult, Healt
 from roadeval.data.arrays import IGNORED
 from roadeval.data.words import percent, short_names
 from roadeval.evaluation.metrics import SHORT, TESTED
-from roadeval.geometry.plan import Plan
+from roadeval.geometry.ground import Plan
 from roadeval.images.disturbing import Disturbance
 from roadeval.recording import layout as at
 from roadeval.recording import rows as columns
@@ -510,11 +510,12 @@ class Recorder:
             looks = looks + 1 if size == last_size else 0
             if looks * LOOK_S >= PATIENCE_S:
                 break
-        if not answer.done() or answer.exception():
+        failure = answer.exception() if answer.done() else None
+        if failure or not answer.done():
             atexit.unregister(rr.rerun_shutdown)
             in_thread(partial(_keep, self._stream))
             self._failed, self._stream = True, None
-            raise self._incomplete()
+            raise self._incomplete(failure)
 
     def _size(self) -> int:
         return self.partial.stat().st_size if self.partial.exists() else 0
@@ -550,11 +551,12 @@ class Recorder:
                 self._watch(self._stream.disconnect)
                 self._stream = None
 
-    def _incomplete(self) -> RecordingError:
-        refusal = self._refusal() or _failure(errno.EIO)
-        problem = f"cannot be written any further: {refusal.strerror}"
-        error = RecordingError(problem, where=self.path)
-        error.__cause__ = refusal
+    def _incomplete(self, failure: BaseException | None = None) -> RecordingError:
+        """Return the error of a file that cannot grow, or else of a call of Rerun that failed."""
+        refusal = self._refusal() or (None if failure else _failure(errno.EIO))
+        reason = refusal.strerror if refusal else " ".join(str(failure).split())
+        error = RecordingError(f"cannot be written any further: {reason}", where=self.path)
+        error.__cause__ = refusal or failure
         return error
 
 

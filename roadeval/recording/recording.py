@@ -217,6 +217,8 @@ class Recording:
         if path not in self._codecs:
             remedy = f"there are {', '.join(sorted(self._codecs))}"
             raise RecordingError(f"there is no {path}", where=self.path, remedy=remedy)
+        if int(frame) != frame:
+            raise TypeError(f"frame: a whole number, not {frame!r}")
         codec = self._codecs[path]
         with name_damage(self.path, f"{path} on frame {frame}"):
             payload = self._file.image(path, codec.component, frame)

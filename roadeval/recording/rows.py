@@ -11,7 +11,6 @@ and limits neither the rows that a killed run loses nor the memory of rows that 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -38,28 +37,11 @@ CHUNK_BYTES: Final = 1 << 19
 is held in memory several times while it is packed and written."""
 
 SHARE: Final = 8
-"""The rows of at most one in so many recorded frames wait, within `WaitLimits`."""
-
-
-@dataclass(frozen=True)
-class WaitLimits:
-    """Limits on the number of frames for which rows wait: a share of the frames so far.
-
-    A killed run loses the rows that wait.
-    """
-
-    least: int
-    most: int
-
-    def after(self, frames: int) -> int:
-        """Return the number of frames whose rows may wait when the recording has ``frames``."""
-        return min(max(frames // SHARE, self.least), self.most)
-
-
-IMAGES_AND_TEXT: Final = WaitLimits(8, MOST_WAITING)
-"""Limits for images, notes, states and table lines."""
-NUMBERS: Final = WaitLimits(64, 1024)
-"""Limits for the graphs' numbers: many entities with a few bytes a frame each."""
+"""The rows of at most one in so many recorded frames wait. A killed run loses them."""
+IMAGES_AND_TEXT: Final = (8, MOST_WAITING)
+"""Least and greatest number of frames for which images, notes, states and table lines wait."""
+NUMBERS: Final = (64, 1024)
+"""The same for the graphs' numbers: many entities with a few bytes a frame each."""
 
 
 class PendingRows:
@@ -91,9 +73,12 @@ class PendingRows:
 
 
 class Batcher(dict[Key, PendingRows]):
-    """Waiting rows of entities with the same `WaitLimits`, sent together; a full chunk earlier."""
+    """Waiting rows of entities, sent together; a full chunk earlier.
 
-    def __init__(self, limits: WaitLimits, header_time: str = HEADER_TIME) -> None:
+    ``limits`` are the least and the greatest number of frames for which they may wait.
+    """
+
+    def __init__(self, limits: tuple[int, int], header_time: str = HEADER_TIME) -> None:
         super().__init__()
         self._limits, self._header_time = limits, header_time
         self._frames = self._due = 0
@@ -110,7 +95,8 @@ class Batcher(dict[Key, PendingRows]):
     def end_frame(self) -> list[Key]:
         """Count a frame; return the keys of the rows that must now be sent."""
         self._frames += 1
-        if self._frames - self._due >= self._limits.after(self._frames):
+        least, most = self._limits
+        if self._frames - self._due >= min(max(self._frames // SHARE, least), most):
             self._due = self._frames
             return list(self)
         return [key for key, rows in self.items() if rows.size >= CHUNK_BYTES]

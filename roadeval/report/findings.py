@@ -103,10 +103,6 @@ class Findings:
         """Height of the frames in pixels."""
         return self.facts.drive.height
 
-    def total(self, variant: str) -> Mapping[str, Any]:
-        """Return the counts and rates of a variant's final mask."""
-        return self.facts.totals[variant][self.facts.finals[variant]]
-
     @cached_property
     def windows(self) -> pd.DataFrame:
         """The rows of ``windows``; a long drive has longer windows."""

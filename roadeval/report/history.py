@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from roadeval.data.arrays import Floats
-from roadeval.data.words import DASH, counted, number, percent, points
+from roadeval.data.words import BARS, DASH, counted, number, percent, points
 from roadeval.evaluation.comparison.history import Line
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import ALL
@@ -22,7 +22,6 @@ from roadeval.report.comparison import limits
 from roadeval.results.history import Event, History, describe_change, verdict
 from roadeval.results.sentences import marked_interval
 
-BARS: Final = "▁▂▃▄▅▆▇█"
 SPARKS: Final = 30
 """Greatest number of bars in the cell that shows a rate over the runs."""
 ROWS: Final = 10

@@ -38,7 +38,7 @@ def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]
 
 def rates_table(facts: Facts | FleetFacts) -> Table:
     """Tabulate every final mask's rates; the best rate of each column is bold."""
-    finals = {name: facts.totals[name][stage] for name, stage in facts.finals.items()}
+    finals = facts.final_totals
     of_fleet, names = isinstance(facts, FleetFacts), [*finals]
     counts = [number(total["frames"]) for total in finals.values()]
     alike = len(set(counts)) == 1 and not of_fleet
@@ -109,19 +109,18 @@ def differences_table(facts: Facts | FleetFacts, *, brief: bool = False) -> Tabl
     A ``brief`` table has only the differences, without both errors and without the numbers of
     better and worse frames.
     """
-    effects, names = facts.final_effects, [*facts.finals]
-    errors = {name: facts.totals[name][stage][TESTED] for name, stage in facts.finals.items()}
+    effects, finals = facts.final_effects, facts.final_totals
     unit = effects[0].rates[TESTED].unit
     rows: list[list[Cell | str]] = []
     for effect in effects:
         change, title = effect.rates[TESTED], f"{effect.variant} {MINUS} {effect.base}"
-        ends = [percent(errors[name]) for name in (effect.base, effect.variant)]
+        ends = [percent(finals[name][TESTED]) for name in (effect.base, effect.variant)]
         won = [number(count or 0) for count in (change.better, change.worse)]
         if unit == "frames":
             won.append(DASH if change.effective is None else f"{change.effective:.0f}")
         rows.append(
             [
-                variant_cell(effect.variant, names, title),
+                variant_cell(effect.variant, [*finals], title),
                 *([] if brief else ends),
                 points(change.mean),
                 marked_interval(change),
@@ -172,8 +171,7 @@ def cameras_table(facts: Facts) -> Table:
     pairs = [(effect.variant, effect.base) for effect in facts.final_effects[:1]]
     rows: list[list[Cell | str]] = []
     for camera, of_camera in facts.cameras.items():
-        finals = of_camera.finals.items()
-        errors = {name: of_camera.totals[name][stage][TESTED] for name, stage in finals}
+        errors = {name: total[TESTED] for name, total in of_camera.final_totals.items()}
         changes = {(e.variant, e.base): e.rates[TESTED] for e in of_camera.final_effects}
         row: list[Cell | str] = [names[camera], number(of_camera.frames.evaluated)]
         row += best_bold([errors.get(name) for name in masks], higher=False)

@@ -213,6 +213,11 @@ class FactsFile:
         """Each scored variant's final stage."""
         return final_stages((name, stage) for name in self.totals for stage in self.totals[name])
 
+    @cached_property
+    def final_totals(self) -> dict[str, dict[str, Any]]:
+        """Counts and rates of each scored variant's final mask."""
+        return {name: self.totals[name][stage] for name, stage in self.finals.items()}
+
     @property
     def focus(self) -> str | None:
         """The scored variant that the result is about; None if nothing was scored."""

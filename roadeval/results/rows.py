@@ -32,8 +32,6 @@ Row = tuple[Any, ...]
 """A row's cells in the order of its table's columns, without the key."""
 LOST: Final = 3
 """Exit code of a replay that has lost a part of its log."""
-OF_DRIVE: Final = ("start_ns", "end_ns", "rate_hz", "width", "height")
-ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
 
 
 class Key(NamedTuple):
@@ -161,6 +159,8 @@ def _cell(value: str | int | float) -> str:
 def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
     """Return the row of ``drives`` of a drive that was replayed, under a name, from a source."""
     status = (DAMAGED if facts.losses else SCORED) if facts.totals else UNSCORED
+    of_drive = ("start_ns", "end_ns", "rate_hz", "width", "height")
+    account = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
     return {
         "name": name,
         "source": source,
@@ -168,8 +168,8 @@ def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
         "exit_code": LOST if facts.losses else 0,
         "reason": None if facts.totals else next(iter(facts.warnings), None),
         "log_digest": facts.log_digest,
-        **{column: getattr(facts.drive, column) for column in OF_DRIVE},
-        **{column: getattr(facts.frames, column) for column in ACCOUNT},
+        **{column: getattr(facts.drive, column) for column in of_drive},
+        **{column: getattr(facts.frames, column) for column in account},
         "losses": "\n".join(facts.losses) or None,
         "warnings": "\n".join(facts.warnings) or None,
         "misfits": "\n".join(facts.misfits) or None,

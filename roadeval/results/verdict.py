@@ -26,7 +26,6 @@ from roadeval.runtime.sentence import Sentence
 if TYPE_CHECKING:
     import pandas as pd
 
-NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 BLIND: Final = f"{BASELINE}, which ignores the image"
 FEW: Final = 5
 """Number of independent frames; with fewer, one drive says little about other frames."""
@@ -111,7 +110,8 @@ def verdict(
     frames drawn at random.
     """
     if not totals:
-        return " ".join([NOTHING_SCORED, *without_truth(unlabelled)])
+        nothing = "Nothing to score: no frame with truth was evaluated."
+        return " ".join([nothing, *without_truth(unlabelled)])
     stages = final_stages((variant, stage) for variant, masks in totals.items() for stage in masks)
     rates = {variant: totals[variant][stage] for variant, stage in stages.items()}
     best = lowest({name: mask for name, mask in rates.items() if name != BASELINE})
@@ -205,7 +205,9 @@ def _points(change: Difference, name: str, *, alone: bool = False) -> str:
     doubt = ""
     if not alone and change.low is not None:
         doubt = (
-            f" ({DASH.join(_ends(change))} on others)" if is_sure(change) else " (may be chance)"
+            f" ({DASH.join(_ends(change))} on other {change.unit})"
+            if is_sure(change)
+            else " (may be chance)"
         )
     direction = "worse" if change.mean > 0 else "better"
     return f"{_size(change.mean, change)} points{doubt} {direction} than {name}"
@@ -218,8 +220,8 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
     is ``change``, because then they are of the same frames or drives.
 
     >>> change = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 9)
-    >>> print(describe_change(change, "new", "old", ({"ERR": 0.05}, {"ERR": 0.03})))
-    new is better than old: 3.0 % wrong instead of 5.0 % (9 frames). On others by 1.0 to 3.0 points.
+    >>> print(describe_change(change, "new", "old", ({}, {})))
+    new is better than old: by 2.0 points (9 frames). On other frames by 1.0 to 3.0 points.
     """
     if not change.units:
         return f"Nothing to compare: {TESTED} is undefined on every {change.unit[:-1]}."
@@ -236,7 +238,7 @@ def describe_change(change: Difference, new: str, base: str, ends: tuple[Rates, 
         size = f"{_size(after, change)} % wrong instead of {_size(before, change)} %"
     direction, doubt = "worse" if change.mean > 0 else "better", _no_interval(change)
     if not doubt and is_sure(change):
-        doubt = f"On others by {' to '.join(_ends(change))} points."
+        doubt = f"On other {change.unit} by {' to '.join(_ends(change))} points."
     elif not doubt:
         family = ""
         if is_sure(replace(change, p_holm=None)):

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import islice
 from typing import TYPE_CHECKING, Final
 
 from roadeval.data import BASELINE
@@ -33,11 +32,29 @@ def explain(facts: Facts | FleetFacts, classes: pd.DataFrame) -> dict[str, list[
     which it errs most, and the disturbance that harms it most. Nothing is explained if truth or
     masks do not fit the images. ``classes`` are the rows of the table of that name.
     """
-    if facts.misfits:
-        return {}
-    variants = (name for name in facts.finals if name != BASELINE)
-    by_variant = {name: [*islice(_reasons(facts, classes, name), MOST)] for name in variants}
-    return {name: reasons for name, reasons in by_variant.items() if reasons}
+    why: dict[str, list[Reason]] = {}
+    for variant in facts.finals if not facts.misfits else ():
+        if variant == BASELINE:
+            continue
+        reasons, rows = [], only(classes, variant=variant)
+        for kind, sentence in describe_classes(rows, variant).items():
+            frames: list[int] = []
+            if isinstance(facts, Facts):  # frames with the most false or missed road of a class
+                is_kind = rows["truth"] == ("other" if kind == "false" else "road")
+                wrong = rows["road"] if kind == "false" else rows["pixels"] - rows["road"]
+                most = wrong.where(is_kind, -1).to_numpy().argmax()
+                frames = [*map(int, str(rows["worst"].iloc[most]).split())]
+            reasons.append(Reason(sentence, frames))
+        # Regions tell already if one part of the image is worse than the rest.
+        slices = (part for part in facts.slices.get(variant, []) if part.conditions)
+        if part := next(slices, None):
+            reasons.append(Reason(describe_slice(part), [] if part.drives else part.worst))
+        changes = facts.disturbances.get(variant, {})
+        if any(is_significant(change.difference) for change in changes.values()):
+            reasons.append(Reason(describe_disturbances({variant: changes}, variant), []))
+        if reasons:
+            why[variant] = reasons[:MOST]
+    return why
 
 
 def with_doubts(facts: Facts, sentences: Sequence[str]) -> Facts:
@@ -49,26 +66,6 @@ def with_doubts(facts: Facts, sentences: Sequence[str]) -> Facts:
     variants = (name for name in facts.finals if name != BASELINE)
     why = {name: [*doubts, *facts.why.get(name, [])][:MOST] for name in variants}
     return replace(facts, why=why) if doubts else facts
-
-
-def _reasons(facts: Facts | FleetFacts, classes: pd.DataFrame, variant: str) -> Iterator[Reason]:
-    """Yield the confirmed reasons of a variant: its classes, its conditions, its disturbances."""
-    rows = only(classes, variant=variant)
-    for kind, sentence in describe_classes(rows, variant).items():
-        frames: list[int] = []
-        if isinstance(facts, Facts):  # frames with the most false or missed road of a class
-            is_kind = rows["truth"] == ("other" if kind == "false" else "road")
-            wrong = rows["road"] if kind == "false" else rows["pixels"] - rows["road"]
-            most = wrong.where(is_kind, -1).to_numpy().argmax()
-            frames = [*map(int, str(rows["worst"].iloc[most]).split())]
-        yield Reason(sentence, frames)
-    # Regions tell already if one part of the image is worse than the rest.
-    conditional = (confirmed for confirmed in facts.slices.get(variant, []) if confirmed.conditions)
-    for confirmed in islice(conditional, 1):
-        yield Reason(describe_slice(confirmed), [] if confirmed.drives else confirmed.worst)
-    changes = facts.disturbances.get(variant, {})
-    if any(is_significant(change.difference) for change in changes.values()):
-        yield Reason(describe_disturbances({variant: changes}, variant), [])
 
 
 NAMED: Final = 3

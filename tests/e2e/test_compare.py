@@ -87,6 +87,8 @@ def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tm
     ("words", "code", "said"),
     [
         (["--fail-if", "ERR > 1"], 2, "is no condition"),
+        (["--fail-if", "post.filtered.ERR > 101%"], 2, "101 is not from 0 to 100: no ERR is"),
+        (["--fail-if", "post.filtered.ERR < -101pp"], 2, "-101 is not from -100 to 100: no ERR"),
         (["-o", "change.docx"], 2, "the name must end in .pdf, .html, .md, .json or .svg"),
         (["--fail-if", "post.net.ERR > 1pp"], 1, "nothing compared is called post.net"),
         (["--variant", "net"], 1, "no variant net"),

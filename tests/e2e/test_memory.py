@@ -16,11 +16,10 @@ MEASURE = f"""
 import json, os, sys
 from roadeval import replay
 from roadeval.recording import recorder
-from roadeval.recording.rows import WaitLimits
 
 # Rows wait in memory for more frames the longer the recording, up to a limit at 1,024 frames and
 # more. Here that limit is reached before the first measurement.
-recorder.IMAGES_AND_TEXT = recorder.NUMBERS = WaitLimits(20, 20)
+recorder.IMAGES_AND_TEXT = recorder.NUMBERS = (20, 20)
 
 peaks = {{}}
 

@@ -236,6 +236,17 @@ def test_picking_on_repeats_no_frame_and_keeps_the_probabilities_right(labelled,
     assert stamps_of(picks_in(work / "at_once"), "random") == stamps_of(after, "random")
 
 
+def test_a_folder_that_has_all_frames_stays_as_it_is(begun, tmp_path):
+    words = ("pick", "out.rrd", "-n", 1000, "--format", "coco", "-o", tmp_path / "all")
+    assert here(*words, cwd=begun).returncode == 0
+    proposals = (tmp_path / "all" / "proposals" / "instances.json").read_bytes()
+    again = here(*words, cwd=begun)
+    assert again.returncode == 0, again.stderr
+    assert ": 0 frames to label" in again.stdout
+    (file,) = (tmp_path / "all" / "proposals").iterdir()
+    assert file.read_bytes() == proposals
+
+
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
     work, truths, without_workers
 ):

@@ -16,7 +16,7 @@ from roadeval.evaluation.score.label_errors import (
     find_suspects,
     rank_suspects,
 )
-from roadeval.results.labels import describe_suspects
+from roadeval.results.sentences import describe_suspects
 
 FRAMES = 40
 HEIGHT, WIDTH = 120, 160

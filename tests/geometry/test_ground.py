@@ -12,8 +12,7 @@ from benchmarks.world.camera import Camera, Pose
 from roadeval import RoadevalError, configure
 from roadeval.config.tables import ConfigError
 from roadeval.data import Calibration, Mounting
-from roadeval.geometry.ground import Ground, ground_of
-from roadeval.geometry.plan import OUTSIDE, Plan
+from roadeval.geometry.ground import OUTSIDE, Ground, Plan, ground_of
 from roadeval.geometry.settings import GroundSettings
 
 SIZE = 640, 480

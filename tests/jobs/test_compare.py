@@ -177,6 +177,16 @@ def test_the_rows_of_final_masks_are_those_of_the_whole_table(made, kind, table)
     pd.testing.assert_frame_equal(rows, expected, check_categorical=False)
 
 
+def test_a_result_named_twice_and_a_table_that_does_not_exist_are_refused(made):
+    with pytest.raises(roadeval.RoadevalError) as twice:
+        roadeval.Result(made.alone, made.many, made.alone / ".." / made.alone.name)
+    assert (twice.value.where, twice.value.problem) == (str(made.alone), "it is named twice")
+    with pytest.raises(roadeval.RoadevalError) as unknown:
+        roadeval.Result(made.alone).table("frame")
+    assert unknown.value.problem == "there is no table frame"
+    assert unknown.value.remedy.startswith("did you mean frames? the tables are: frames, ")
+
+
 def test_several_results_are_one_table_with_their_drives(made):
     both = roadeval.Result(made.alone, made.many)
     assert len({*both.scores["drive"]}) == len(both.compared) == len(both.drives) == 2

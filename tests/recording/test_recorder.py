@@ -26,8 +26,8 @@ from roadeval.recording.rows import (
     CHUNK_BYTES,
     IMAGES_AND_TEXT,
     NUMBERS,
+    SHARE,
     Batcher,
-    WaitLimits,
     numbers,
     states,
     texts,
@@ -228,6 +228,18 @@ def test_no_wait_for_a_hung_disk_is_without_end(drive, tmp_path, monkeypatch, hu
     assert time.monotonic() - begun < 10
 
 
+def test_a_call_of_rerun_that_fails_says_why(tmp_path, monkeypatch):
+    def refuse(*_args, **_options):
+        raise ValueError("no such\nview")
+
+    monkeypatch.setattr(rr.RecordingStream, "save", refuse)
+    with (
+        pytest.raises(RecordingError, match="written any further: no such view"),
+        _recorder(tmp_path / "out.rrd"),
+    ):
+        pass
+
+
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(RecordingError, match="cannot be written"), _recorder(tmp_path / "file/out"):
@@ -244,7 +256,7 @@ def _recorder(path):
     return Recorder(path, layout())
 
 
-WAIT = WaitLimits(8, 64)
+WAIT = (8, 64)
 
 
 def rows_of(pending):
@@ -268,7 +280,7 @@ def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
     ended = list(run(1000, lambda frame: [("/a", numbers, (frame,))]))
     assert [row for *_, rows in ended for row in rows] == list(range(1000))
     for after, _, rows in ended[:-1]:
-        assert after - rows[0] + 1 == WAIT.after(after + 1)
+        assert after - rows[0] + 1 == min(max((after + 1) // SHARE, 8), 64)
 
 
 def test_an_entity_is_full_by_its_bytes_and_others_wait_on():

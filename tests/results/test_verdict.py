@@ -61,13 +61,15 @@ CASES = {
         "filtered: 2.8 % of the pixels are wrong (91 frames). It misses 5.6 % of the road and "
         "takes 1.4 % of the rest for road. That is 3.3 points (may be chance) better than "
         "blind, which "
-        "ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 on others) better than without the "
+        "ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) better than without the "
         "filter. Next: try --variant robust.",
     ),
     "the filter harms": (
         (drive(filtered=0.154, unfiltered=0.062), filtered(WORSE, WORSE)[:1]),
         "filtered: 15.4 % of the pixels are wrong (91 frames). It misses 30.8 % of the road and "
-        "takes 7.7 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
+        "takes 7.7 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) worse "
         "than without the filter. There is no baseline: no labelled frame was used for training. "
         "Best here is unfiltered: 6.2 %. Next: try --variant robust.",
     ),
@@ -91,7 +93,8 @@ CASES = {
             {"net": AT},
         ),
         "net: 5.5 % of the pixels are wrong (91 frames). It misses 11.0 % of the road and takes "
-        "2.8 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) better than "
+        "2.8 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) better than "
         "blind, which ignores the image. Set `threshold = 0.01380`: then 2.7 % are wrong.",
     ),
     "what was brought is the focus": (
@@ -101,7 +104,8 @@ CASES = {
     "what was brought is not the best": (
         (drive(filtered=0.01, unfiltered=0.02, mine=0.05, blind=0.1), against("blind", mine=WORSE)),
         "mine: 5.0 % of the pixels are wrong (91 frames). It misses 10.0 % of the road and takes "
-        "2.5 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse than "
+        "2.5 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) worse than "
         "blind, which ignores the image. Best here is filtered: 1.0 %.",
     ),
     "four variants": (
@@ -137,8 +141,8 @@ CASES = {
     "a fleet": (
         (fleet(8, robust=0.02, blind=0.1), against("blind", robust=OF_DRIVES)),
         "robust: 2.0 % of the pixels are wrong (8 drives). It misses 4.0 % of the road and "
-        "takes 1.0 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on "
-        "others) better "
+        "takes 1.0 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other drives) better "
         "than blind, which ignores the image.",
     ),
     "a fleet of three": (
@@ -159,8 +163,10 @@ CASES = {
             {"mine": AT},
         ),
         "filtered: 15.4 % of the pixels are wrong (91 frames). It misses 30.8 % of the road and "
-        "takes 7.7 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
-        "than blind, which ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
+        "takes 7.7 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) worse "
+        "than blind, which ignores the image, and 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) worse "
         "than without the filter. Best here is mine: 1.9 %.",
     ),
     "a threshold is better, and another variant": (
@@ -251,7 +257,8 @@ def test_the_verdict_on_a_chosen_focus_speaks_of_it_and_its_own_differences():
     effects = [*filtered(BETTER, BETTER), *against("blind", mine=BETTER, unfiltered=WORSE)]
     assert verdict(totals, effects, focus="unfiltered") == (
         "unfiltered: 12.0 % of the pixels are wrong (91 frames). It misses 24.0 % of the road and "
-        "takes 6.0 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 on others) worse "
+        "takes 6.0 % of the rest for road. That is 9.2 points (7.1\N{EN DASH}11.0 "
+        "on other frames) worse "
         "than blind, which ignores the image. Best here is mine: 1.9 %."
     )
 
@@ -275,13 +282,15 @@ OTHER = {"ERR": 0.2}, {"ERR": 0.062}
         (
             BETTER,
             SAME,
-            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). On others by 7.1 "
+            "new is better than old: 6.2 % wrong instead of 15.4 % (91 frames). On other "
+            "frames by 7.1 "
             "to 11.0 points.",
         ),
         (
             WORSE,
             OTHER,
-            "new is worse than old: by 9.2 points (91 frames). On others by 7.1 to 11.0 points.",
+            "new is worse than old: by 9.2 points (91 frames). On other "
+            "frames by 7.1 to 11.0 points.",
         ),
         (UNSURE, OTHER, "new is better than old: by 3.3 points (91 frames). This may be chance."),
         (
@@ -308,7 +317,7 @@ OTHER = {"ERR": 0.2}, {"ERR": 0.062}
             replace(OF_DRIVES, groups=7, better=7, worse=1),
             SAME,
             "new is better than old: 6.2 % wrong instead of 15.4 % (8 drives in 7 groups, better "
-            "on 7, worse on 1). On others by 7.1 to 11.0 points.",
+            "on 7, worse on 1). On other drives by 7.1 to 11.0 points.",
         ),
     ],
 )

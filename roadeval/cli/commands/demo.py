@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
 
 from roadeval.cli import arguments, console
 from roadeval.cli.exit_codes import ExitCode
 
-DEFAULT: Final = Path("recordings", "demo.mcap")
-
 
 def demo(
-    output: Annotated[
-        Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")
-    ] = DEFAULT,
-    quiet: arguments.Quiet = False,
+    output: arguments.NewLog = Path("recordings", "demo.mcap"), quiet: arguments.Quiet = False
 ) -> int:
     """Write the demo drive: a synthetic road with known truth.
 

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 from roadeval.cli import arguments, console, messages
-from roadeval.cli.exit_codes import ExitCode
 
 
 def pack(
     images: Annotated[Path, arguments.argument("IMAGES", "Images, a video, or kitti/training.")],
-    output: Annotated[Path, arguments.option("-o --output", "File of the log.", "DRIVE.mcap")],
+    output: arguments.NewLog,
     *,
     truth: Annotated[
         Path | None, arguments.option("--truth", "Folder of masks, paired by name.", "MASKS")
@@ -40,4 +39,4 @@ def pack(
     if not quiet:
         masks = f", {packed.labelled} with a mask" if packed.labelled else ""
         console.say(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
-    return ExitCode.DONE
+    return messages.losses(packed.losses)

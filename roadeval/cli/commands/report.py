@@ -19,57 +19,65 @@ def _check_width(width: str) -> str:
     return width
 
 
+Output = Annotated[
+    Path | None,
+    arguments.option(
+        "-o --output",
+        "File of the report; one that ends in .html is a page to browse. Default: "
+        "reports/<recording>.pdf, or report.pdf in the results folder.",
+        "FILE.pdf|FILE.html",
+        callback=arguments.ending_in(".pdf", ".html", unnamed=(".htm", "")),
+    ),
+]
+Figures = Annotated[
+    Path | None,
+    arguments.option(
+        "--figures",
+        "Folder for the paper's figures 2, 3a and 3b as PDF and SVG, in place of the report. "
+        "Figure 2 needs a recording.",
+        "DIR",
+    ),
+]
+Width = Annotated[
+    str,
+    arguments.option(
+        "--width",
+        "Width of each figure, as 8.5cm, 85mm or 3.35in; letters keep their size.",
+        "LENGTH",
+        callback=_check_width,
+    ),
+]
+Title = Annotated[
+    Literal["drive", "none"],
+    arguments.option(
+        "--title",
+        "Title of each figure: what it shows and the drive's name; or none, for a text with "
+        "captions of its own.",
+    ),
+]
+Opened = Annotated[
+    bool, arguments.option("--open", "Open the report in the browser, or in the PDF viewer.")
+]
+Audit = Annotated[
+    Path | None,
+    arguments.option(
+        "--audit",
+        "Folder of 'roadeval audit': the report begins with what it says of the labels.",
+        "FOLDER",
+    ),
+]
+
+
 def report(
     result: arguments.Result,
     *,
-    output: Annotated[
-        Path | None,
-        arguments.option(
-            "-o --output",
-            "File of the report; one that ends in .html is a page to browse. Default: "
-            "reports/<recording>.pdf, or report.pdf in the results folder.",
-            "FILE.pdf|FILE.html",
-            callback=arguments.ending_in(".pdf", ".html", unnamed=(".htm", "")),
-        ),
-    ] = None,
+    output: Output = None,
     focus: arguments.Focus = None,
-    figures: Annotated[
-        Path | None,
-        arguments.option(
-            "--figures",
-            "Folder for the paper's figures 2, 3a and 3b as PDF and SVG, in place of the report. "
-            "Figure 2 needs a recording.",
-            "DIR",
-        ),
-    ] = None,
-    width: Annotated[
-        str,
-        arguments.option(
-            "--width",
-            "Width of each figure, as 8.5cm, 85mm or 3.35in; letters keep their size.",
-            "LENGTH",
-            callback=_check_width,
-        ),
-    ] = "16cm",
-    title: Annotated[
-        Literal["drive", "none"],
-        arguments.option(
-            "--title",
-            "Title of each figure: what it shows and the drive's name; or none, for a text with "
-            "captions of its own.",
-        ),
-    ] = "drive",
-    open_report: Annotated[
-        bool, arguments.option("--open", "Open the report in the browser, or in the PDF viewer.")
-    ] = False,
-    audit: Annotated[
-        Path | None,
-        arguments.option(
-            "--audit",
-            "Folder of 'roadeval audit': the report begins with what it says of the labels.",
-            "FOLDER",
-        ),
-    ] = None,
+    figures: Figures = None,
+    width: Width = "16cm",
+    title: Title = "drive",
+    open_report: Opened = False,
+    audit: Audit = None,
     camera: arguments.Camera = None,
     quiet: arguments.Quiet = False,
 ) -> int:

@@ -14,9 +14,8 @@ from roadeval.cli.options import FLAGS
 from roadeval.cli.screens import tables
 from roadeval.data.words import first_of
 from roadeval.report.blocks import Block, Heading
-from roadeval.report.sections import disturbances
-from roadeval.report.sections.drives import by_reason, drives_table
-from roadeval.report.sections.summary import drives_account, why
+from roadeval.report.sections import failures
+from roadeval.report.sections.drives import by_reason, drives_account, drives_table
 from roadeval.report.tables import differences_table, rates_table
 from roadeval.results.fleet import FleetFolder
 
@@ -45,8 +44,8 @@ def show(outcome: FleetOutcome, out: Console) -> None:
     if facts.totals:
         blocks: list[Block] = [rates_table(facts)]
         blocks += [differences_table(facts, brief=True)] if facts.effects else []
-        blocks += disturbances.brief(facts)
-        blocks += why(facts)
+        blocks += failures.brief(facts)
+        blocks += failures.why(facts)
         worst = drives_table(FleetFolder(outcome.folder), WORST)
         tables.show([*blocks, Heading(f"Drives with the highest ERR of {facts.focus}"), worst], out)
         out.print()

@@ -7,25 +7,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.cli.screens import tables
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import counted, percent
+from roadeval.data.words import BARS, counted, percent
 from roadeval.evaluation.metrics import TESTED
 from roadeval.recording.viewer import has_screen
 from roadeval.report.blocks import Block, Text
-from roadeval.report.sections import disturbances
+from roadeval.report.sections import failures
 from roadeval.report.sections.ground import distance_table, kitti_table
-from roadeval.report.sections.summary import why
 from roadeval.report.tables import cameras_table, differences_table, stages_table, thresholds_table
 from roadeval.results.facts import Facts
 from roadeval.results.sentences import account, correction
 from roadeval.results.verdict import ROBUST, without_truth
-
-BARS: Final = "▁▂▃▄▅▆▇█"
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -92,12 +89,12 @@ def _score_tables(facts: Facts, metres: Sequence[Mapping[str, Any]]) -> Iterator
             yield Text(legend)
     if facts.curves:
         yield thresholds_table(facts.curves, facts.totals)
-    yield from disturbances.brief(facts)
+    yield from failures.brief(facts)
     if metres:
         yield distance_table(metres, [*facts.finals], brief=True)
     if facts.kitti:
         yield kitti_table(facts)
-    yield from why(facts)
+    yield from failures.why(facts)
 
 
 def _next_commands(outcome: Outcome, place: Path) -> Iterator[str]:

@@ -281,30 +281,23 @@ def _compare_two(
         base_rows = base.table("frames", new_keys)
         frames["base"] += _count_frames(base_rows)
         variants = [values_of(rows, "variant") for rows in (base_rows, new_rows)]
-        pairs = pairing.common_masks(base_rows, new_rows)
+        pairs = _pair_frames(base_rows, new_rows, frames)
+        del base_rows, new_rows  # regions take more memory than all else
         common = {*tables.keys_of(pairs)[0]}
         without_frames += [drive_names[key] for key in new_keys.values() if key not in common]
         if not common:
             continue
-        base_rows, new_rows = (_of_drives(rows, common) for rows in (base_rows, new_rows))
-        frames["only base"] += _count_frames(base_rows) - _count_frames(pairs, "_base")
-        frames["only new"] += _count_frames(new_rows) - _count_frames(pairs)
-        frames["relabelled"] += pairing.truth_differs(base_rows, new_rows)
         masks.append(by_drive(pairs, MASK, groups))
         finals = only(pairs, final=True)
         finals = finals[finals["variant"] != BASELINE]
         if several:
             drives += _drive_changes(new.label, drive_names, finals, settings)
-        del base_rows, new_rows  # regions take more memory than all else
         new_regions = new.table("regions", {key: key for key in new_keys.values()})
         parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups, [TESTED]))
     if not masks:
         raise _nothing_shared(labels, *variants)
     one_camera = len(matched) == 1  # then a number names a frame
-    disagreed: Iterator[pairing.Disagreement] = iter(())
-    if one_camera and across_variants:
-        disagreed = pairing.disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
     of_masks, of_regions = (None, None) if several else (pairs, parts)
     changed = changed_settings(matched)
     old_classes = base.table("classes", {old: key for key, old in base_keys.items()})
@@ -320,7 +313,11 @@ def _compare_two(
         drives=tuple(_rank_drives(drives)),
         regions=tuple(_region_changes(new.label, pd.concat(regions), of_regions, settings)),
         moved=tuple(pairing.moved_frames(new.label, pairs)) if one_camera else (),
-        disagreements=tuple(disagreed),
+        disagreements=tuple(
+            pairing.disagreements(new.table("disagreements", [*base_keys]), pairs, *labels)
+        )
+        if one_camera and across_variants
+        else (),
         warnings=tuple(_warnings(labels, without_frames, frames, changed)),
         settings=settings,
         classes=tuple(_class_changes(new.label, old_classes, new_classes)),
@@ -396,9 +393,17 @@ def _batches(drives: Sequence[ComparedDrive]) -> Iterator[list[tuple[str, str]]]
     yield [drive.key for drive in batch]
 
 
-def _of_drives(rows: pd.DataFrame, drives: Collection[tuple[str, str]]) -> pd.DataFrame:
-    keys, places = tables.keys_of(rows)
-    return rows[np.array([key in drives for key in keys], bool)[places]]
+def _pair_frames(base: pd.DataFrame, new: pd.DataFrame, frames: Counter[str]) -> pd.DataFrame:
+    """Return the masks that two results share, and count the other frames of the same drives."""
+    pairs = pairing.common_masks(base, new)
+    common, sides = {*tables.keys_of(pairs)[0]}, []
+    for rows in (base, new):
+        keys, places = tables.keys_of(rows)
+        sides.append(rows[np.array([key in common for key in keys], bool)[places]])
+    frames["only base"] += _count_frames(sides[0]) - _count_frames(pairs, "_base")
+    frames["only new"] += _count_frames(sides[1]) - _count_frames(pairs)
+    frames["relabelled"] += pairing.truth_differs(*sides)
+    return pairs
 
 
 def by_drive(

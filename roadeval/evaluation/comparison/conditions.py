@@ -76,8 +76,8 @@ class Condition:
     def parse(cls, text: str) -> Condition:
         """Read a condition.
 
-        A `RoadevalError` if it does not follow the grammar, or asks for certainty about a quantity
-        without an interval.
+        A `RoadevalError` if it does not follow the grammar, has a limit that no rate and no change
+        reaches, or asks for certainty about a quantity without an interval.
         """
         match = _GRAMMAR.fullmatch(text)
         if match is None:
@@ -90,6 +90,10 @@ class Condition:
         if rate not in QUANTITIES:
             remedy = f"there are {', '.join(QUANTITIES)}"
             raise RoadevalError(f"there is no rate {rate}", where=repr(text), remedy=remedy)
+        least = 0 if unit == "%" else -100
+        if not least <= float(number) <= 100:
+            problem = f"{number} is not from {least} to 100: no {rate} is beyond"
+            raise RoadevalError(problem, where=repr(text))
         if surely and unit == "%":
             raise RoadevalError(
                 "'surely' asks for the interval of a change (pp), and a level (%) has none: leave "

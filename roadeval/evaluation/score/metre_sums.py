@@ -16,12 +16,7 @@ from roadeval.evaluation.metres import ABOVE, FREE, LEFT, Survey
 from roadeval.evaluation.score.counts import count
 from roadeval.evaluation.score.thresholds import Curves
 
-RECALLS: Final = np.linspace(0, 1, 11)
 CENTIMETRES: Final = 100
-_COLUMNS: Final = (
-    *("variant", "measure", "where", "frames", "missing", "value", "p95", "low", "high"),
-)
-"""Columns of ``metres``."""
 
 
 def measure(survey: Survey, masks: Mapping[str, Bits], truth: TruthBits) -> dict[str, FrameMetres]:
@@ -81,8 +76,9 @@ class MetreSums:
         from a threshold on the probability of road.
         """
         levels = {variant: counts for (variant, _), counts in curves.counts.items()}
+        names = "variant", "measure", "where", "frames", "missing", "value", "p95", "low", "high"
         for cells in self._rows(levels):
-            yield dict(zip(_COLUMNS, cells, strict=True))
+            yield dict(zip(names, cells, strict=True))
 
     def _rows(self, levels: Mapping[str, Sums]) -> Iterator[tuple[Any, ...]]:
         nan = math.nan
@@ -158,7 +154,7 @@ def kitti(counts: Sums, levels: Sums | None) -> dict[str, float]:
     recall = positive[with_road] / positive[0]
     f = 2 * precision * recall / (precision + recall)
     best = int(f.argmax())
-    greatest = [precision[recall >= least].max(initial=0.0) for least in RECALLS]
+    greatest = [precision[recall >= least].max(initial=0.0) for least in np.linspace(0, 1, 11)]
     return {
         "MaxF": float(f[best]),
         "AP11": float(np.mean(greatest)),

@@ -27,8 +27,8 @@ from roadeval.logs.truth.picks import IMAGES, LABELS, PROPOSALS
 from roadeval.logs.truth.shapes import Proposal
 from roadeval.results.facts import is_fleet
 from roadeval.results.folder import RUN
-from roadeval.results.labels import describe_annotator, describe_suspect, describe_suspects
 from roadeval.results.rows import records
+from roadeval.results.sentences import describe_annotator, describe_suspect, describe_suspects
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import AnyPath, put, writing
 from roadeval.runtime.text import visible
@@ -111,11 +111,7 @@ def audit(
             problem = "no labelled frame has a picture" if has_labels else "no frame has a label"
             remedy = "replay with --record masks" if has_labels else "give labels with --truth"
             raise RoadevalError(problem, where=path, remedy=remedy)
-        blocks = np.array_split(frames, -(-len(frames) // BLOCK))
-        tables = [find_suspects([_view(drive, int(frame)) for frame in block]) for block in blocks]
-        suspects = rank_suspects(concatenate(tables), len(frames), count)
-        suspects.insert(0, "rank", range(1, len(suspects) + 1))
-        suspects["why"] = [describe_suspect(row) for row in records(suspects)]
+        suspects = _find_suspects(drive, frames, count)
         on_labels = [describe_suspects(suspects)]
         for name in annotators:
             pairs = ((drive.truth(n), drive.final_masks(n).get(name)) for n in frames)
@@ -142,12 +138,21 @@ def _check_scale(scale: float) -> None:
         raise RoadevalError("does not go with labels to correct", setting="frames.scale")
 
 
-def _view(drive: DriveResult, frame: int) -> LabelledView:
-    recording, truth = drive.recording, drive.truth(frame)
+def _find_suspects(drive: DriveResult, frames: Sequence[int], count: int) -> pd.DataFrame:
+    """Return the suspects among the labels of some frames, with their ranks and why."""
+    recording, tables = drive.recording, []
     assert recording is not None
-    assert truth is not None
-    stamp, masks = recording.stamps[frame], drive.final_masks(frame)
-    return LabelledView.of(frame, stamp, recording.image(frame), truth, masks)
+    for block in np.array_split(frames, -(-len(frames) // BLOCK)):
+        views = []
+        for frame in block.tolist():
+            truth, masks = recording.truth(frame), drive.final_masks(frame)
+            about = frame, recording.stamps[frame], recording.image(frame)
+            views.append(LabelledView.of(*about, truth, masks))
+        tables.append(find_suspects(views))
+    suspects = rank_suspects(concatenate(tables), len(frames), count)
+    suspects.insert(0, "rank", range(1, len(suspects) + 1))
+    suspects["why"] = [describe_suspect(row) for row in records(suspects)]
+    return suspects
 
 
 def read_doubts(folder: AnyPath, drive: DriveResult) -> list[str]:

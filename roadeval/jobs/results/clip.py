@@ -105,8 +105,8 @@ def _film(
     recording, picker = drive.recording, FramePicker(drive)
     assert recording is not None
     variants = [variant.name for variant in recording.variants]
-    focus, totals, final = focus_of(variants, drive.focus), drive.facts.totals, drive.facts.finals
-    best = lowest({n: totals[n][final[n]] for n in final if n in variants and n != focus})
+    focus, finals = focus_of(variants, drive.focus), drive.facts.final_totals
+    best = lowest({n: finals[n] for n in finals if n in variants and n != focus})
     shown = [*dict.fromkeys(filter(None, [focus, best, *variants]))][:2]
     rows = facts_of(drive) if len(drive.rows) else ()
     rates_of = {(row.frame, name): row.rates[name] for row in rows for name in row.rates}

@@ -16,7 +16,7 @@ from roadeval.evaluation.score.frame import judge
 from roadeval.evaluation.score.unlabelled import SIGNS
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.evaluation.tables import finals, only, scene_ns, values_of
-from roadeval.geometry.plan import Plan
+from roadeval.geometry.ground import Plan
 from roadeval.jobs.results.result import DriveResult
 from roadeval.recording.layout import CELL
 from roadeval.report.blocks import Strip

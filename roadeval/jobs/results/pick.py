@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Final
@@ -26,7 +25,7 @@ from roadeval.logs.truth.shapes import Proposal
 from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
-from roadeval.runtime.files import AnyPath, put, writing
+from roadeval.runtime.files import AnyPath, Paths, list_paths, put, writing
 from roadeval.runtime.text import likely
 from roadeval.version import VERSION
 
@@ -59,7 +58,7 @@ class PickedFrames:
 
 
 def pick(
-    source: AnyPath | Sequence[AnyPath],
+    source: Paths,
     count: int,
     folder: AnyPath,
     config: RunConfig | None = None,
@@ -95,7 +94,7 @@ def pick(
     RoadevalError
         If nothing can be picked; its text says what to do.
     """
-    sources = [source] if isinstance(source, str | PathLike) else [*source]
+    sources = list_paths(source)
     if not sources:
         raise RoadevalError("nothing to pick from: name a result, a log or a fleet")
     with TemporaryDirectory(prefix="roadeval-") as place:
@@ -274,7 +273,7 @@ def _write_picks(
             name = f"{frame.stamp_ns:019d}.png"
             (folder / IMAGES / name).write_bytes(png_of(recording.image(frame.frame)))
             proposals.append(Proposal(name, mask))
-        for name, content in proposal_files(proposals, labels).items():
+        for name, content in proposal_files(proposals, labels).items() if new else ():
             path = folder / PROPOSALS / name
             wave = new[0][0].wave if path.exists() else ""
             path.with_name(f"{wave}{name}").write_bytes(content)

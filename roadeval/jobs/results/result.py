@@ -43,8 +43,9 @@ from roadeval.results.rows import (
     table_of,
     table_of_scores,
 )
+from roadeval.results.schema import TABLES
 from roadeval.results.verdict import verdict, with_focus
-from roadeval.runtime.text import visible
+from roadeval.runtime.text import likely, visible
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -317,6 +318,11 @@ class Result:
 
     def __init__(self, *paths: str | Path, focus: str | None = None) -> None:
         self.paths = tuple(map(local_path, paths))
+        places = [path.resolve() for path in self.paths]
+        if twice := [
+            path for path, place in zip(paths, places, strict=True) if places.count(place) > 1
+        ]:
+            raise RoadevalError("it is named twice", where=twice[0], remedy="name each result once")
         self._chosen: Final = focus
         self._opened: list[Opened] = []
         for path in self.paths:
@@ -490,8 +496,13 @@ class Result:
         """Return a table of all drives, or of some, by drive and camera.
 
         With ``final`` only the rows of final masks, of ``frames`` or ``regions``. The table
-        ``regions`` of a fleet has only these.
+        ``regions`` of a fleet has only these. A `RoadevalError` if no table has the name.
         """
+        if name not in TABLES:
+            problem = f"there is no table {name}"
+            raise RoadevalError(
+                problem, remedy=f"{likely(name, TABLES)}the tables are: {', '.join(TABLES)}"
+            )
         parts = []
         for result in self._opened:
             if isinstance(result, FleetFolder):

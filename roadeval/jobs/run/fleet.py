@@ -30,7 +30,7 @@ from roadeval.jobs.run.prepared import software
 from roadeval.results.facts import FleetFacts, Member, Origin
 from roadeval.results.fleet import FleetWriter, made_path
 from roadeval.results.schema import DAMAGED, FAILED
-from roadeval.runtime.files import AnyPath, Paths, is_claimed, list_paths, reading, sha256_of
+from roadeval.runtime.files import AnyPath, Paths, is_claimed, reading, sha256_of
 from roadeval.runtime.repository import current_commit
 from roadeval.runtime.sentence import Sentence
 from roadeval.version import VERSION
@@ -88,7 +88,7 @@ def replay_fleet(
         Called in the caller's thread whenever a drive is done.
     """
     commit, config = current_commit(), (config or RunConfig()).resolved()
-    entries = find_drives([str(drive) for drive in list_paths(drives)])
+    entries = find_drives(drives)
     if config.cameras:
         entries = name_cameras(
             [camera for entry in entries for camera in entry.of_cameras(config.cameras)]
@@ -203,16 +203,15 @@ class FleetRun:
             try:
                 models.append(future.result())
             except Exception as error:  # only the fold's drives fail
-                problem = self._reason(error, f"the model of fold {fold} was trained")
-                models.append(fleet_work.FoldModel(fold, "", problem))
+                models.append(("", self._reason(error, f"the model of fold {fold} was trained")))
         for entry in self.entries:
-            model = models[folds[entry.id]]
-            path = str(training[model.fold].path)
+            fold = folds[entry.id]
+            digest, problem = models[fold]
+            path = str(training[fold].path)
             config = configs[entry.id].override({"training": {"model": path}})
-            how = software(config), model.sha256, model.fold
-            task = DriveTask(self.folder, entry, config, *how)
-            if model.problem:
-                self._fail(task, model.problem)
+            task = DriveTask(self.folder, entry, config, software(config), digest, fold)
+            if problem:
+                self._fail(task, problem)
             else:
                 tasks.append(task)
         return tasks

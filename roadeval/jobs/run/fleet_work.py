@@ -295,22 +295,12 @@ class FoldTask:
         return self.folder / MODELS / f"fold_{self.fold}.model"
 
 
-@dataclass(frozen=True)
-class FoldModel:
-    """The model of a fold."""
-
-    fold: int
-    """The fold; the model will score its drives."""
-    sha256: str
-    """SHA-256 of its file; empty if there is none."""
-    problem: str = ""
-
-
-def train_fold(task: FoldTask) -> FoldModel:
+def train_fold(task: FoldTask) -> tuple[str, str]:
     """Train the model of a fold, unless it exists and nothing has changed.
 
-    A drive without truth, or one that cannot be used, is skipped, and the next one is tried. A
-    `FleetError` if the fleet's disk fails, or the worker has other software.
+    Return the SHA-256 of its file, or an empty text and why there is no model. A drive without
+    truth, or one that cannot be used, is skipped, and the next one is tried. A `FleetError` if the
+    fleet's disk fails, or the worker has other software.
     """
     _check_software(task.software, task.config)
     facts_file = task.path.with_suffix(".json")
@@ -323,11 +313,11 @@ def train_fold(task: FoldTask) -> FoldModel:
             trained = read_json(read_bounded(facts_file))
             as_asked = {"asked": digest, "sha256": sha256_of(task.path)}
             if isinstance(trained, dict) and as_asked.items() <= trained.items():
-                return FoldModel(task.fold, as_asked["sha256"])
+                return as_asked["sha256"], ""
         return _train_model(task, facts_file, digest)
 
 
-def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> FoldModel:
+def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> tuple[str, str]:
     """Train on enough drives; the file beside the model says why others gave no frames."""
     held = HeldFrames()
     drawn: dict[Path, Sequence[Frame]] = {}
@@ -350,11 +340,11 @@ def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> FoldMod
         why = f": {min(passed.values())}" if passed else ""
         others = f"none of the {len(task.candidates)} drives of the other folds"
         problem = f"could not be trained: {others} gives training frames{why}"
-        return FoldModel(task.fold, "", f"the model of fold {task.fold} {problem}")
+        return "", f"the model of fold {task.fold} {problem}"
     try:
         model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
     except TrainingError as error:
-        return FoldModel(task.fold, "", error.sentence)
+        return "", error.sentence
     save_model(model, task.path)
     digest = sha256_of(task.path)
     about_model = {
@@ -366,7 +356,7 @@ def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> FoldMod
         "training_frames": sorted(model.digests),
     }
     put(facts_file, json_text(about_model).encode())
-    return FoldModel(task.fold, digest)
+    return digest, ""
 
 
 WIDTH: Final = 320

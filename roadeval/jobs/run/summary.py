@@ -53,7 +53,6 @@ RANKS_AT_ONCE: Final = ("entropy", "disagreement")
 """Signs of doubt that follow from one frame, without the frame before."""
 OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "why", "seconds")
 """Names of facts that only a single camera has, not a rig."""
-FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
 def make_facts(
@@ -296,7 +295,8 @@ def warnings(run: Run, totals: Totals) -> Iterator[str]:
     if is_given and roles[Role.TRAINING] and roles[Role.EVALUATED]:
         yield (
             f"{roles[Role.TRAINING]} of the model's {len(run.model.digests)} training frames lie "
-            f"in this drive; their neighbours are evaluated and {FLATTERED}"
+            "in this drive; their neighbours are evaluated and look alike, which flatters the "
+            "result: use a model of other drives"
         )
     yield from _pick_warnings(run)
     for variant, stages in totals.items():

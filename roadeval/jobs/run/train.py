@@ -13,7 +13,7 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.logs.frames import FrameStream
 from roadeval.logs.log import open_log
-from roadeval.runtime.files import AnyPath, Paths, list_paths
+from roadeval.runtime.files import AnyPath, Paths
 from roadeval.training import learning
 from roadeval.training.learning import HeldFrames, TrainingError
 from roadeval.training.model import Model, save_model
@@ -36,7 +36,7 @@ def train(
     there is nothing to learn.
     """
     config = (config or RunConfig()).resolved()
-    settings, entries = config.training, find_drives([str(drive) for drive in list_paths(drives)])
+    settings, entries = config.training, find_drives(drives)
     total = settings.frames * len(entries)
     held = HeldFrames(lambda count: on_progress(Progress(count, total, "training")))
     with holding(output, inputs=[entry.path for entry in entries]):

@@ -6,6 +6,7 @@ only where they are needed: around the stamp of the image.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -430,6 +431,14 @@ def check_clocks(images: TopicReader, labels: TopicReader, offset: int) -> None:
     # Any two of GPS, TAI and UTC differ by more than three seconds.
     if min(*ours, *theirs) <= 0 or abs(apart) < 3 * NS or 4 * abs(end - last - apart) > abs(apart):
         return
+    ratio = theirs[0] / ours[0]
+    thousands = round(math.log(ratio, 1000))
+    if thousands and 0.99 < ratio / 1000.0**thousands < 1.01:
+        raise LogError(
+            f"its stamps are {ratio:.3g} times those of {images.name}: one of them is not in "
+            "nanoseconds",
+            where=labels.name,
+        )
     outside = 2 * (-begin if apart < 0 else end) > abs(apart)
     one_log = labels.channels[0].container in [channel.container for channel in images.channels]
     if outside or (one_log and 2 * max(-logged, last) <= abs(apart)):

@@ -26,6 +26,7 @@ from mcap.writer import Writer
 
 from roadeval.data import FrameResult
 from roadeval.data.arrays import Image
+from roadeval.data.words import counted
 from roadeval.images.decoding import orientation_of, png_of, size_of, upright
 from roadeval.images.formats import ImageError, Limits, format_of
 from roadeval.logs.container.records import Message
@@ -256,6 +257,8 @@ class PackResult:
     """Source of the stamps, in words."""
     warnings: tuple[str, ...] = ()
     """Images without a mask (if there are masks), and masks without an image."""
+    losses: tuple[str, ...] = ()
+    """Parts of a damaged video that are not in the log."""
 
 
 def pack(
@@ -273,8 +276,8 @@ def pack(
 
     ``rate_hz`` is images a second. By default a video has its own times; images have the times in
     their names if every name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else
-    10 images a second. A `LogError` if there is nothing to pack, a file is unreadable, or no mask
-    belongs to an image.
+    10 images a second. The readable frames of a damaged video are written. A `LogError` if there is
+    nothing to pack, a file is unreadable, or no mask belongs to an image.
     """
     images, output = Path(images), Path(output)
     if rate_hz is not None and not 1e-4 <= rate_hz <= 1000:
@@ -285,16 +288,18 @@ def pack(
         raise LogError("neither a folder of images nor a video", where=images)
     if masks is not None:
         raise LogError("masks go with a folder of images, not with a video", where=images)
-    number, orientations = 0, set[int]()
+    number, orientations, losses = 0, set[int](), list[str]()
     with LogWriter(output) as log:
-        for number, (time_ns, jpeg) in enumerate(_read_frames(images, orientations), start=1):
+        frames = _read_frames(images, orientations, losses)
+        for number, (time_ns, jpeg) in enumerate(frames, start=1):
             regular = 0 if rate_hz is None else round((number - 1) * NS / rate_hz)
             log.image(CAMERA, time_ns if rate_hz is None else regular, jpeg, "jpeg")
         if not number:
             raise LogError("a video without frames", where=images)
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
     matrix = "frames are turned as the video's display matrix asks; calibrations are of the sensor"
-    return PackResult(output, number, 0, words, (matrix,) if orientations - {1} else ())
+    warnings = (matrix,) if orientations - {1} else ()
+    return PackResult(output, number, 0, words, warnings, tuple(losses))
 
 
 def _pack_folder(
@@ -362,12 +367,14 @@ def _list_labels(masks: Path, images: Path) -> Sequence[Path]:
         raise refused from error
 
 
-def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, bytes]]:
+def _read_frames(
+    video: Path, orientations: set[int], losses: list[str]
+) -> Iterator[tuple[int, bytes]]:
     """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
 
     Frames are in the order in which they are shown, and so are their times: those of an AVI with
     B-frames are in the order of decoding. Adds to the ``orientations`` from which frames are
-    turned. A `LogError` if the video cannot be read, or holds no video.
+    turned, and to the ``losses``. A `LogError` if the video cannot be read, or holds no video.
     """
     import av
     import cv2
@@ -380,10 +387,12 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
             times, jpegs, first = list[int](), deque[bytes](), None
             unit = stream.time_base or Fraction(1, 25)
             step = round(1 / (stream.average_rate or 25) / unit)
-            last = -step
-            for frame in chain(container.decode(stream), repeat(None, REORDERED)):
+            last = latest = -step
+            frames = _readable_frames(container, stream, video, losses)
+            for frame in chain(frames, repeat(None, REORDERED)):
                 if frame is not None:
                     last = last + step if frame.pts is None else frame.pts
+                    latest = max(latest, last)
                     heappush(times, last)
                     orientations.add(orientation := turn_of(frame))
                     bgr = upright(frame.to_ndarray(format="bgr24"), orientation)
@@ -393,8 +402,41 @@ def _read_frames(video: Path, orientations: set[int]) -> Iterator[tuple[int, byt
                     pts = heappop(times)
                     first = pts if first is None else first
                     yield round((pts - first) * unit * NS), jpegs.popleft()
+            seconds = float((latest + step - (first or 0)) * unit)
+            stated = _stated_seconds(container, stream)
+            if seconds < stated - float(3 * step * unit):
+                problem = f"its frames end after {seconds:.1f} of the {stated:.1f} s that it states"
+                losses.append(f"{video.name}: {problem}; the file may be cut off")
     except (av.FFmpegError, OSError) as error:
         raise LogError(f"not a readable video ({error.strerror})", where=video) from error
+
+
+def _readable_frames(container: Any, stream: Any, video: Path, losses: list[str]) -> Iterator[Any]:
+    """Yield decoded frames in their order; the ``losses`` name packets that cannot be decoded."""
+    import av
+
+    lost, is_damaged = 0, False
+    for packet in container.demux(stream):
+        if is_damaged and not packet.is_keyframe and packet.size:
+            lost += 1  # it may build upon a damaged one
+            continue
+        try:
+            yield from packet.decode()
+            is_damaged = False
+        except av.InvalidDataError:
+            lost, is_damaged = lost + 1, True
+    if lost:
+        losses.append(f"{video.name}: {counted(lost, 'packet')} cannot be decoded")
+
+
+def _stated_seconds(container: Any, stream: Any) -> float:
+    """Return how long a video is by its header; 0 if that says nothing of this stream."""
+    if container.format.name == "avi":  # its duration is guessed from the size of the file
+        return float(stream.frames / (stream.average_rate or 25))
+    if stream.duration is not None and stream.time_base is not None:
+        return float(stream.duration * stream.time_base)
+    is_alone = len(container.streams) == 1  # another stream may be longer
+    return (container.duration or 0) / 1e6 if is_alone else 0.0
 
 
 def _image(file: Path, *, is_label: bool = False, of_kitti: bool = False) -> tuple[bytes, str]:

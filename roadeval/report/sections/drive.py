@@ -1,33 +1,112 @@
-"""The sections of one drive: its rates, the filter, regions, stages and thresholds; or masks."""
+"""The sections of one drive, from its first page to the command that makes it again."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
-from roadeval.data.words import DASH, defined, number, percent, points
+from roadeval.data.words import (
+    DASH,
+    UNSET,
+    defined,
+    listing,
+    number,
+    percent,
+    points,
+    setting,
+    short_names,
+)
 from roadeval.evaluation import tables
 from roadeval.evaluation.metres import ABOVE
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.tables import merge_names, only, perfect_stages
-from roadeval.report.blocks import Block, Cell, Details, Figure, Heading, ImageGrid, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Command,
+    Details,
+    Figure,
+    Heading,
+    ImageGrid,
+    KeepTogether,
+    LinkList,
+    Table,
+    Text,
+)
 from roadeval.report.captions import caption, note
 from roadeval.report.charts import standard as charts
 from roadeval.report.charts.standard import describe_points, figures_over_drive
 from roadeval.report.findings import Findings
-from roadeval.report.images import example_grid, heat_map
+from roadeval.report.images import example_grid, heat_map, jpeg
+from roadeval.report.sections.failures import beware, when_it_fails, why, worse_than_baseline
+from roadeval.report.sections.frames import notable_frame
 from roadeval.report.tables import (
     OTHERS,
+    cameras_table,
     differences_table,
+    rates_table,
     stages_table,
     thresholds_table,
     variant_cell,
 )
 from roadeval.results.fleet import FleetFolder
-from roadeval.results.sentences import CLAIMED, correction
+from roadeval.results.sentences import CLAIMED, account, correction
+
+LOSSES: Final = 3
+"""Greatest number of losses that are named."""
+
+
+def summary(findings: Findings) -> Iterator[Block]:
+    """Yield the first page of a drive."""
+    yield Heading("Summary")
+    facts = findings.facts
+    if not findings.complete:
+        yield BulletList("Partial recording", [caption("partial")], "warning")
+    yield Text(facts.verdict, "verdict")
+    for name in dict.fromkeys((facts.focus, *facts.why)):
+        yield from why(facts, name)
+    for frame in findings.worst[:1]:
+        title = f"First frame to look at: {frame.frame}"
+        if frame.rates:
+            wrong = percent(frame.rates[frame.variant][TESTED], 1)
+            title = caption("worst frame", frame=frame.frame, variant=frame.variant, ERR=wrong)
+        command = findings.inspect(frame.frame) if findings.inspect else ""
+        yield LinkList([(title, f"#frame-{frame.frame}")], command)
+    if facts.totals:
+        yield rates_table(facts)
+    yield Text(account(facts.frames, facts.windows, facts.evaluation.window), "note")
+    if findings.thumbnails:
+        pictures = [(image.title, jpeg(image)) for image in findings.thumbnails]
+        legend = caption("thumbnails without truth")
+        if focus := facts.focus:
+            legend = caption("thumbnails", variant=focus, errors=caption("errors"))
+        yield ImageGrid(pictures, 4, caption=legend)
+    yield beware([*warnings(findings)])
+
+
+def warnings(findings: Findings) -> Iterator[str]:
+    """Yield the reasons to doubt the numbers of a drive."""
+    facts = findings.facts
+    yield from facts.warnings
+    trained_here = facts.training.model is None or facts.training.adapted
+    if facts.training.source == "truth" and trained_here and findings.facts.totals:
+        yield caption("trained on this drive")
+    if worse := worse_than_baseline(facts):
+        yield caption("worse than blind", worse=worse)
+    for variant, total in facts.final_totals.items():
+        if rates := [f"{rate} on {number(n)}" for rate, n in total["undefined"].items() if n]:
+            frames, rates_named = number(total["frames"]), listing(rates)
+            yield caption("undefined rates", variant=variant, frames=frames, rates=rates_named)
+    yield from (f"Lost: {loss}" for loss in facts.losses[:LOSSES])
+    if len(facts.losses) > LOSSES:
+        yield caption("more losses", count=len(facts.losses) - LOSSES)
+    if not findings.pictured:
+        yield caption("no pictures")
 
 
 def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
@@ -58,7 +137,7 @@ def over_drive(findings: Findings, *, heading: bool = True) -> Iterator[Block]:
 
 
 def filter_effect(findings: Findings) -> Iterator[Block]:
-    """Yield the effects of the filter and the variants, and how much masks flicker."""
+    """Yield the effects of the filter and the variants."""
     effects = findings.facts.final_effects
     if effects:
         filter_too = "the filter and " * (FILTERED in findings.facts.finals)
@@ -87,10 +166,9 @@ def filter_effect(findings: Findings) -> Iterator[Block]:
         legend = caption("filter frame by frame", treated=FILTERED, control=UNFILTERED)
         figure = Figure([charts.difference(pairs, FILTERED, UNFILTERED, change)], legend)
         yield Details("The filter, frame by frame", [figure])
-    yield from _over_time(findings)
 
 
-def _over_time(findings: Findings) -> Iterator[Block]:
+def over_time(findings: Findings) -> Iterator[Block]:
     """Tabulate the flicker of each final mask and of the truth, and the error episodes."""
     measures = {
         name: measured | measured["episodes"]
@@ -172,7 +250,7 @@ def stages(findings: Findings) -> Iterator[Block]:
             [
                 variant_cell(variant, [*findings.facts.totals]),
                 *((points if p in [*parts][1:] else percent)(parts.get(p)) for p in columns),
-                percent(findings.total(variant)[TESTED]),
+                percent(findings.facts.final_totals[variant][TESTED]),
             ]
             for variant, parts in findings.error_parts.items()
         ],
@@ -184,10 +262,9 @@ def stages(findings: Findings) -> Iterator[Block]:
     if findings.changes:
         numbers.append(note("repaired and spoiled"))
     yield Details("Every stage in numbers", numbers)
-    yield from _oracles(findings)
 
 
-def _oracles(findings: Findings) -> Iterator[Block]:
+def oracles(findings: Findings) -> Iterator[Block]:
     """Yield the errors that remain if the truth replaces a stage; nothing if not counted."""
     rows = [*perfect_stages(findings.table("oracles"), findings.table("frames"))]
     if not rows:
@@ -216,7 +293,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
     totals = findings.facts.totals
     for row in rows if {FILTERED, UNFILTERED} <= totals.keys() else ():
         is_filter = row["variant"] == FILTERED and row["oracle"] not in totals[FILTERED]
-        without = findings.total(UNFILTERED)
+        without = findings.facts.final_totals[UNFILTERED]
         if is_filter and row["frames"] == without["frames"]:
             helps = row[TESTED] <= without[TESTED]
             meaning = caption("perfect filter helps" if helps else "perfect filter harms")
@@ -244,3 +321,83 @@ def masks(findings: Findings) -> Iterator[Block]:
     yield Text(caption("without truth"))
     if findings.examples:
         yield example_grid(findings.examples)
+
+
+def cameras(findings: Findings) -> Iterator[Block]:
+    """Tabulate ERR of each camera's final masks, and the filter's effect."""
+    yield Heading("Cameras")
+    yield cameras_table(findings.facts)
+
+
+def each_camera(findings: Findings) -> Iterator[Block]:
+    """Yield the verdict, the rates and the worst frame of each camera."""
+    names = short_names([*findings.cameras])
+    for camera, of_camera in findings.cameras.items():
+        facts = of_camera.facts
+        yield Heading(f"Camera {names[camera]}")
+        topic = camera if names[camera] != camera.strip("/") else ""
+        size = f"{facts.drive.width} \N{MULTIPLICATION SIGN} {facts.drive.height}"
+        yield Text(", ".join(filter(None, (topic, size))), "note")
+        yield Text(facts.verdict)
+        if facts.totals:
+            yield Details("Rates of every final mask", [rates_table(facts)])
+        yield from when_it_fails(of_camera, level=2)
+        for frame in of_camera.worst[:1]:
+            yield KeepTogether([*notable_frame(of_camera, frame)])
+
+
+def provenance(findings: Findings) -> Iterator[Block]:
+    """Yield the log, the methods and the command that makes the results again."""
+    facts = findings.facts
+    yield Heading("How to reproduce this")
+    if facts.log:
+        digest = Text(f"Digest of its index and checksums: {facts.log.digest}")
+        again = [Command(findings.again), note("reproduced")] if findings.again else []
+        yield KeepTogether([Text(f"Log: {facts.log.path}"), digest, *again])
+    for name, labels in facts.masks.items():
+        yield Text(f"{name}: {labels['path']}, digest {labels['digest']}", "note")
+    # Stages, such as networks, describe themselves.
+    for variant, stages in facts.methods.items():
+        for stage, description in stages.items():
+            rows = dict(flatten(description))
+            if (seconds := facts.seconds.get(variant, {}).get(stage)) is not None:
+                rows["ms a frame"] = f"{1e3 * seconds:.2f}"
+            yield Details(f"{variant}: {stage}", [_words(["what", "value"], [*rows.items()])])
+    details: list[Block] = [Text(topic, "note") for topic in facts.drive.topics]
+    # The log's digest and the settings above tell more than the digest of the input.
+    properties = [
+        f"{name}: {value}"
+        for name, value in findings.properties.items()
+        if name != "input" and value != ""
+    ]
+    if properties:
+        details.append(Text("; ".join(properties), "note"))
+    if facts.versions:
+        details.append(_words(["package", "version"], [*facts.versions.items()]))
+    if facts.seconds:
+        times = [
+            [variant, stage, f"{1e3 * seconds:.2f}"]
+            for variant, stages in facts.seconds.items()
+            for stage, seconds in stages.items()
+        ]
+        details.append(_words(["variant", "stage", "ms a frame"], times))
+    if details:
+        yield Details("Topics, versions, milliseconds", details, on_paper=False)
+
+
+def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Return a small table with words in its first two columns."""
+    return Table(columns, rows, text_columns=(0, 1), small=True)
+
+
+def flatten(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield settings that have a value, by their dotted names.
+
+    >>> list(flatten({"svm": {"kernel": "rbf"}, "size": [4, 3], "seed": None}))
+    [('svm.kernel', 'rbf'), ('size', '4, 3')]
+    """
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from flatten(value, f"{prefix}{name}.")
+        elif (text := setting(value)) != UNSET:
+            yield f"{prefix}{name}", text

@@ -1,9 +1,9 @@
-"""The sections of many drives: differences, tags, worst frames, and missing drives."""
+"""The sections of many drives: first page, differences, tags, worst frames, missing drives."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from os.path import relpath
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import counted, first_of, number, percent, points
-from roadeval.evaluation.metrics import TESTED
+from roadeval.evaluation.metrics import SHORT, TESTED
 from roadeval.evaluation.score.scoreboard import BASES, Effect
 from roadeval.evaluation.tables import finals, group_rows, only, values_of
 from roadeval.report.blocks import (
@@ -24,16 +24,18 @@ from roadeval.report.blocks import (
     Heading,
     ImageFile,
     ImageGrid,
+    LinkList,
     Table,
     Text,
 )
 from roadeval.report.captions import caption, note
 from roadeval.report.chart import Chart, ChartKind, Series, looks, thin
 from roadeval.report.charts.standard import forest
-from roadeval.report.tables import breaks_of
+from roadeval.report.sections.failures import beware, why, worse_than_baseline
+from roadeval.report.tables import breaks_of, differences_table, rates_table
 from roadeval.results.fleet import APART_NS, OF_A_DRIVE, FleetFolder, results_path
 from roadeval.results.rows import records
-from roadeval.results.schema import FAILED, UNSCORED
+from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 from roadeval.results.sentences import MARK, marked_interval
 from roadeval.runtime.text import elide
 
@@ -46,8 +48,58 @@ OF_ONE_REASON: Final = 4
 """Greatest number of drives that are named for one reason."""
 TAGS: Final = 48
 """Greatest number of letters of a drive's tags."""
-_WORDS: Final = ("drive", "state", "group", "tags")
-_SHOWN: Final = (TESTED, "FPR", "FNR")
+STATUSES: Final = {
+    SCORED: "scored",
+    DAMAGED: "scored without the lost part",
+    UNSCORED: "without truth",
+    FAILED: "failed",
+}
+
+
+def summary(findings: FleetFolder) -> Iterator[Block]:
+    """Yield the first page of a fleet."""
+    yield Heading("Summary")
+    facts = findings.facts
+    yield Text(facts.verdict, "verdict")
+    yield from why(facts)
+    for frame in records(findings.worst[:1]):
+        where = f"{findings.names[frame['drive']]}, frame {frame['frame']}"
+        title = f"Worst frame: {where} (ERR {percent(frame[TESTED], 1)} %)"
+        yield LinkList([(title, WORST_AT)], findings.inspect(frame))
+    if facts.totals:
+        yield rates_table(facts)
+    if facts.effects:
+        yield differences_table(facts)
+        yield note("weights of drives")
+    yield Text(f"{drives_account(facts.counts, facts.frames)}.", "note")
+    yield beware([*warnings(findings)])
+
+
+def warnings(findings: FleetFolder) -> Iterator[str]:
+    """Yield the reasons to doubt the numbers of many drives."""
+    facts = findings.facts
+    if failed := facts.counts.get(FAILED):
+        yield caption("failed drives", failed=number(failed), drives=number(len(facts.drives)))
+    if damaged := facts.counts.get(DAMAGED):
+        yield caption("damaged drives", drives=_were(damaged))
+    drives = findings.drives
+    trained_here = (drives["evaluated"] > 0) & (drives["trained_on"] > 0) & drives["model"].isna()
+    if count := int(trained_here.sum()):
+        yield caption("drives that trained their models", drives=_were(count))
+    if worse := worse_than_baseline(facts):
+        yield caption("worse than blind in a fleet", worse=worse)
+    yield from (f"{sentence}." for sentence in facts.warnings)
+
+
+def _were(count: int) -> str:
+    return f"{counted(count, 'drive')} {'was' if count == 1 else 'were'}"
+
+
+def drives_account(counts: Mapping[str, int], frames: int) -> str:
+    """Return the numbers of drives, by their states, and of evaluated frames."""
+    states = (f"{number(counts[s])} {text}" for s, text in STATUSES.items() if counts.get(s))
+    drives = counted(sum(counts.values()), "drive")
+    return f"{drives}: {', '.join(states)}; {number(frames)} frames evaluated"
 
 
 def plots(findings: FleetFolder) -> Iterator[Block]:
@@ -157,7 +209,7 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
         "group": rows["group"].astype(object).fillna("").tolist(),
         "tags": [tags.get(drive, "") for drive in rows.index],
         "frames": [number(int(count)) for count in rows["evaluated"].fillna(0)],
-        **{rate: [*map(percent, scores[rate])] for rate in _SHOWN},
+        **{rate: [*map(percent, scores[rate])] for rate in SHORT},
     }
     for base in BASES:  # differences of the focus, if it has any, or of another variant
         effects = only(findings.effects, base=base)
@@ -169,10 +221,11 @@ def drives_table(findings: FleetFolder, worst: int | None = None) -> Table:
     unused = [title for title in ("group", "tags") if not any(columns[title])]
     unused += [] if worst is None else ["state", "group"]
     columns = {title: cells for title, cells in columns.items() if title not in unused}
+    words = ("drive", "state", "group", "tags")
     return Table(
         [*columns],
         [*zip(*columns.values(), strict=True)],
-        text_columns=[place for place, title in enumerate(columns) if title in _WORDS],
+        text_columns=[place for place, title in enumerate(columns) if title in words],
         small=True,
     )
 
@@ -295,3 +348,9 @@ def worst(findings: FleetFolder, across: int = ACROSS, most: int = SEEN) -> Iter
         text_columns=(0, 1, 2, 3, 4),
         small=True,
     )
+
+
+def provenance(findings: FleetFolder) -> Iterator[Block]:
+    """Yield the version that replayed many drives, and the files with the settings."""
+    yield Heading("What was run")
+    yield Text(caption("run of a fleet", version=findings.facts.version, folder=findings.path))

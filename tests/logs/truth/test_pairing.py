@@ -1,5 +1,6 @@
 """Which label belongs to which image, of the same clock and of another."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -242,6 +243,18 @@ def test_labels_that_another_clock_has_stamped_are_refused_with_the_offset(tmp_p
     assert f"they lie about {abs(apart)} s {side} them for the same log times" in str(caught.value)
     moved = TopicSettings(sync_offset_ms=-1000 * apart)
     assert labelled(path, topics=moved)[0] == [*chosen]
+
+
+@pytest.mark.parametrize("in_ns", ["/camera", "/labels"])
+@pytest.mark.parametrize("unit", [10**3, 10**6])
+def test_stamps_in_another_unit_are_no_other_clock(tmp_path, unit, in_ns):
+    topics = {
+        topic: [(stamp if topic == in_ns else stamp // unit, logged) for stamp, logged in times()]
+        for topic in ("/camera", "/labels")
+    }
+    ratio = f"{unit if in_ns == '/labels' else 1 / unit:.3g}"
+    with pytest.raises(LogError, match=re.escape(f"its stamps are {ratio} times those of /camera")):
+        labelled(write(tmp_path / "a.mcap", topics))
 
 
 @pytest.mark.parametrize(

@@ -155,8 +155,8 @@ def test_images_and_colour_masks_of_the_road(painted: Path, tmp_path: Path) -> N
     assert np.array_equal(frames[0].truth == 1, road)
 
 
-def film(path: Path, rate: int, count: int) -> Path:
-    """Write a video file."""
+def film(path: Path, rate: int, count: int, *, noisy: bool = False) -> Path:
+    """Write a video file; without noise the level of each frame is 8 times its number."""
     import av
 
     with av.open(str(path), "w") as container:
@@ -168,6 +168,8 @@ def film(path: Path, rate: int, count: int) -> Path:
         stream.options = {"preset": "veryfast", "x264-params": "b-adapt=0"}
         for number in range(count):
             image = np.full((48, 64, 3), 8 * number, np.uint8)
+            if noisy:
+                image = np.random.default_rng(number).integers(256, size=image.shape).astype("u1")
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
         container.mux(stream.encode(None))
     return path
@@ -202,6 +204,22 @@ def test_frames_of_a_video_are_in_the_order_in_which_they_are_shown(tmp_path, su
     levels = [frame.image.mean() for frame in read]
     np.testing.assert_allclose(levels, [8 * number for number in range(30)], atol=4)
     np.testing.assert_allclose([f.stamp_ns / 1e6 for f in read], np.arange(30) * 40, atol=1)
+
+
+@pytest.mark.parametrize("suffix", [".mkv", ".avi", ".mp4"])
+def test_of_a_video_that_was_cut_off_the_readable_frames_are_packed(tmp_path, suffix):
+    path = film(tmp_path / f"film{suffix}", 25, 30, noisy=True)
+    assert pack(path, tmp_path / "whole.mcap").losses == ()
+    content = path.read_bytes()
+    if suffix == ".mp4":  # its index stays at the end
+        begin, end = len(content) // 2, len(content) * 3 // 5
+        path.write_bytes(content[:begin] + bytes(end - begin) + content[end:])
+    else:
+        path.write_bytes(content[: len(content) * 3 // 5])
+    packed = pack(path, tmp_path / "film.mcap")
+    assert 10 < packed.frames < 30
+    assert packed.losses[0].startswith(f"film{suffix}: ")
+    assert len(frames_of(packed.path)) == packed.frames
 
 
 @pytest.mark.parametrize("labels", ["labels/a.json", "labels", "images"])

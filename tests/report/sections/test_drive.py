@@ -37,12 +37,11 @@ from roadeval.report.charts import standard as charts
 from roadeval.report.document import document, page_document
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections import drive, drives, summary
+from roadeval.report.sections import drive, drives
 from roadeval.report.sections.drive import filter_effect, over_drive, regions, thresholds
+from roadeval.report.sections.failures import when_it_fails
 from roadeval.report.sections.frames import FrameBrowser, notable_frame, strip, worst_frames
 from roadeval.report.sections.ground import UNSURE, distance_table
-from roadeval.report.sections.slices import when_it_fails
-from roadeval.report.sections.summary import warnings
 from roadeval.report.tables import differences_table, rates_table, stages_table
 from roadeval.results.facts import Facts, FrameAccount, TrainingFacts
 from roadeval.results.fleet import APART_NS, OF_A_DRIVE, FleetFolder
@@ -203,7 +202,7 @@ def test_undefined_rates_are_never_the_best_and_told_and_how_often():
     assert bold(rates_table(findings.facts), "ERR") == ["12.00"]
     undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
     totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
-    assert list(warnings(some_findings(totals=totals))) == [
+    assert list(drive.warnings(some_findings(totals=totals))) == [
         "filtered: means leave out the frames on which a rate is undefined "
         "(FNR on 1,200 and FPR on 3 of 1,200 frames)."
     ]
@@ -211,11 +210,11 @@ def test_undefined_rates_are_never_the_best_and_told_and_how_often():
 
 def test_a_drive_that_trained_itself_says_so():
     own = some_findings(totals=ALONE, training=TrainingFacts("truth"))
-    assert [text.partition(" (")[0] for text in warnings(own)] == [
+    assert [text.partition(" (")[0] for text in drive.warnings(own)] == [
         "Trained on frames of this drive"
     ]
     given = TrainingFacts("truth", model="city.model")
-    assert not list(warnings(some_findings(totals=ALONE, training=given)))
+    assert not list(drive.warnings(some_findings(totals=ALONE, training=given)))
 
 
 NAMES = ["filtered", "unfiltered"]
@@ -415,9 +414,9 @@ def tables(section, fleet):
 
 
 def test_the_first_page_has_the_verdict_the_rates_and_the_differences(fleet):
-    told = opened_blocks(summary.section, fleet)
+    told = opened_blocks(drives.summary, fleet)
     assert fleet.facts.verdict in [b.text for b in told if isinstance(b, Text)]
-    rates, effects = tables(summary.section, fleet)
+    rates, effects = tables(drives.summary, fleet)
     assert [row[0] for row in plain_rows(rates)] == ["filtered", "unfiltered", "blind"]
     first, *others = (own["post"] for own in fleet.facts.totals.values())
     assert plain_rows(rates)[0][1:4] == ["10", "200", f"{100 * first['ERR']:.2f}"]
