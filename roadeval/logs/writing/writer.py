@@ -417,8 +417,8 @@ def _readable_frames(container: Any, stream: Any, video: Path, losses: list[str]
 
     lost, is_damaged = 0, False
     for packet in container.demux(stream):
-        if is_damaged and not packet.is_keyframe and packet.size:
-            lost += 1  # it may build upon a damaged one
+        if packet.is_corrupt or (is_damaged and not packet.is_keyframe and packet.size):
+            lost, is_damaged = lost + 1, True  # it may build upon a damaged one
             continue
         try:
             yield from packet.decode()
@@ -427,6 +427,9 @@ def _readable_frames(container: Any, stream: Any, video: Path, losses: list[str]
             lost, is_damaged = lost + 1, True
     if lost:
         losses.append(f"{video.name}: {counted(lost, 'packet')} cannot be decoded")
+    size = video.stat().st_size
+    if container.format.name == "mpegts" and all(size % length for length in (188, 192, 204)):
+        losses.append(f"{video.name}: it ends within a packet; the file may be cut off")
 
 
 def _stated_seconds(container: Any, stream: Any) -> float:

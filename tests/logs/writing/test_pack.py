@@ -222,6 +222,20 @@ def test_of_a_video_that_was_cut_off_the_readable_frames_are_packed(tmp_path, su
     assert len(frames_of(packed.path)) == packed.frames
 
 
+@pytest.mark.parametrize(
+    ("begin", "end", "told"),
+    [(100.5, 10_000, "it ends within a packet"), (100, 103, "cannot be decoded")],
+)
+def test_a_transport_stream_that_lacks_bytes_is_packed_and_told(tmp_path, begin, end, told):
+    path = film(tmp_path / "film.ts", 25, 30, noisy=True)
+    assert pack(path, tmp_path / "whole.mcap").losses == ()
+    content = path.read_bytes()
+    path.write_bytes(content[: int(188 * begin)] + content[188 * end :])
+    packed = pack(path, tmp_path / "film.mcap")
+    assert 0 < packed.frames < 30
+    assert told in packed.losses[0]
+
+
 @pytest.mark.parametrize("labels", ["labels/a.json", "labels", "images"])
 def test_labels_of_an_annotation_tool_are_said_to_be_for_a_replay(labels, tmp_path):
     for folder in ("images", "labels"):
