@@ -301,16 +301,16 @@ class TopicReader:
                     return
         else:
             return
-        before, kept = dict[int, list[tuple[FileChannel, Message]]](), list[int]()
+        before, with_picture = dict[int, list[tuple[FileChannel, Message]]](), list[int]()
         for position in range(len(self)):
             with suppress(FrameError):
                 if pictures.has_no_picture(self.picture(position)):
                     joined = self.carrier(position), self.message(position)
-                    before.setdefault(len(kept), []).append(joined)
+                    before.setdefault(len(with_picture), []).append(joined)
                     continue
-            kept.append(position)
-        self.log_times, self._places = self.log_times[kept], self._places[kept]
-        self._stamps = array("q", [UNREAD]) * len(kept)
+            with_picture.append(position)
+        self.log_times, self._places = self.log_times[with_picture], self._places[with_picture]
+        self._stamps = array("q", [UNREAD]) * len(with_picture)
         self._before, self._cache, self._cached_bytes = before, {}, 0
 
     def messages(self, position: int) -> Iterator[tuple[FileChannel, Message]]:

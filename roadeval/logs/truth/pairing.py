@@ -238,7 +238,7 @@ class Partners:
         twins = _find_equal(images, stamp, image, reach) if equal else []
         cameras = [_camera_at(self._pairing.images, twin) for twin in twins] if twins[1:] else []
         theirs = [_camera_at(self._pairing.labels, label) for label in equal] if cameras else []
-        # Of cameras that share a topic and a stamp, labels belong to the one that they name.
+        # If cameras share a topic and a stamp, a label belongs to the one that it names.
         by_camera = len({*cameras}) > 1 and not {*cameras}.isdisjoint(theirs)
         if by_camera:
             ours = cameras[twins.index(image)]
