@@ -517,7 +517,12 @@ def without_parameters(data: bytes) -> bytes:
 @pytest.mark.parametrize("once", [False, True])
 @pytest.mark.parametrize(
     ("bf", "more"),
-    [(0, KEYED), (3, KEYED), (3, KEYED + ":open-gop=1"), (0, KEYED + ":intra-refresh=1")],
+    [
+        pytest.param(0, KEYED, marks=pytest.mark.sweep),
+        (3, KEYED),
+        (3, KEYED + ":open-gop=1"),
+        (0, KEYED + ":intra-refresh=1"),
+    ],
 )
 def test_a_frame_does_not_depend_on_where_reading_begins(bf: int, more: str, once: bool) -> None:
     video = encoded(MOVING, bf, more)
