@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import replace
 from functools import cached_property
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -217,7 +218,7 @@ class Recording:
         if path not in self._codecs:
             remedy = f"there are {', '.join(sorted(self._codecs))}"
             raise RecordingError(f"there is no {path}", where=self.path, remedy=remedy)
-        if int(frame) != frame:
+        if not (isinstance(frame, Real) and frame // 1 == frame):
             raise TypeError(f"frame: a whole number, not {frame!r}")
         codec = self._codecs[path]
         with name_damage(self.path, f"{path} on frame {frame}"):

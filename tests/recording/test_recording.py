@@ -86,8 +86,9 @@ def test_the_viewer_shows_the_focus_first():
 def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tmp_path):
     bare = replace(drive[3], variants=(), errors={})
     recording = record(tmp_path / "out.rrd", [drive[2], bare, drive[4]])
-    with pytest.raises(TypeError, match="frame: a whole number, not '2'"):
-        recording.layer("filtered", "post", "2")
+    for number in ("2", None, 2.5, float("nan")):
+        with pytest.raises(TypeError, match=f"frame: a whole number, not {number!r}"):
+            recording.layer("filtered", "post", number)
     with pytest.raises(RecordingError, match="/filtered/post has nothing on frame 3"):
         recording.layer("filtered", "post", 3)
     assert rows_of(recording, "/filtered/post", "EncodedImage:blob") == {2: 1, 3: 0, 4: 1}
