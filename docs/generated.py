@@ -212,15 +212,16 @@ def _name(name: str) -> tuple[str, str]:
 
 
 def findings() -> str:
-    """Return the first sentence of each finding, and the software that it is about."""
+    """Return the software that each finding is about, in order, and its first sentence."""
     rows = []
     for path in sorted((ROOT / "findings").glob("*.sh")):
         header, _, _ = path.read_text(encoding="utf-8").partition("\nset -")
         comment = header.replace("#!/usr/bin/env bash\n", "").replace("#", "")
         first, software, *_ = (" ".join(part.split()) for part in comment.split("\n\n"))
         link = f"[{path.stem}](../../findings/{path.name})"
-        rows.append((first, software.removeprefix("Software: "), link))
-    return _table(("what it does", "software", "shown by"), rows)
+        rows.append((software.removeprefix("Software: "), first, link))
+    rows.sort(key=lambda row: row[0].casefold())
+    return _table(("software", "what it does", "shown by"), rows)
 
 
 def _table(head: tuple[str, ...], rows: Any) -> str:
