@@ -167,13 +167,18 @@ def jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
 
 
 class DisturbanceKind(NamedTuple):
-    """A kind of disturbance, with the meaning and the range of its strength."""
+    """A kind of disturbance, such as fog."""
 
     name: str
+    """Its word in ``--disturb`` and, with the strength, in tables and paths: lower-case letters."""
     title: str
+    """What the strength is, such as ``stops of less light``."""
     apply: Apply
+    """Returns the disturbed image as a new array, ``(H, W, 3)`` uint8; not called at strength 0."""
     least: float
+    """Least strength that `Disturbance.parse` takes. If it is negative, strengths have a sign."""
     most: float
+    """Greatest strength that it takes."""
 
 
 BUILT_IN: Final = (
@@ -215,7 +220,8 @@ class Disturbance(NamedTuple):
             raise SettingError(f"there is no disturbance {kind!r}", remedy=remedy)
         is_number = re.fullmatch(r"[+-]?\d{1,3}(\.\d{1,3})?", number)
         if not is_number or not allowed.least <= float(number) <= allowed.most:
-            ends = f"from {allowed.least:g} to {allowed.most:g} ({allowed.title}), as {kind}:2"
+            ends = f"from {allowed.least:g} to {allowed.most:g} ({allowed.title})"
+            ends += f", as {kind}:{np.clip(2, allowed.least, allowed.most):g}"
             raise SettingError(f"{text!r}: the strength of {kind} must be {ends}")
         return cls(kind, float(number) + 0.0)
 
