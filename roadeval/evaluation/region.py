@@ -1,4 +1,4 @@
-"""Regions: sets of pixels that are counted apart in every labelled frame."""
+"""Regions: sets of pixels that are counted separately in every labelled frame."""
 
 from __future__ import annotations
 
