@@ -57,7 +57,7 @@ Random = np.random.Generator
 Apply = Callable[[Rgb, float, Light, Random], Rgb]
 """A function of the image, the strength, the depth, and the random generator.
 
-The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN where not known."""
+The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN if not known."""
 
 
 def exposure(image: Rgb, stops: float, *_: object) -> Rgb:
@@ -73,12 +73,12 @@ def _noisy(light: Light, well: float, random: Random) -> Rgb:
 
 
 def noise(image: Rgb, strength: float, _: Light, random: Random) -> Rgb:
-    """Add the noise of a sensor whose white pixel holds 4096 / 4^(strength - 1) electrons."""
+    """Add the noise of a sensor with 4096 / 4^(strength - 1) electrons in a white pixel."""
     return _noisy(to_light(image), WELL * 4 ** (1 - strength), random)
 
 
 def dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
-    """Divide the light by 2^stops before it falls on the sensor, whose noise stays."""
+    """Divide the light by 2^stops before it falls on the sensor; the sensor's noise stays."""
     return _noisy(to_light(image) * np.float32(2**-stops), WELL, random)
 
 
@@ -195,7 +195,7 @@ BUILT_IN: Final = (
 
 @cache
 def kinds() -> Mapping[str, DisturbanceKind]:
-    """Return the kinds by their names, those of other packages last."""
+    """Return the kinds by their names, other packages' kinds last."""
     names = [kind.name for kind in BUILT_IN]
     others = installed("disturbances", DisturbanceKind, SettingError, names)
     return by_name((*BUILT_IN, *others))

@@ -505,7 +505,7 @@ def describe(
     """Describe a log by its summary and indexes, and what a replay would choose of it.
 
     With ``verify``, or if it has at most `SMALL` bytes, it is read completely to find all damage;
-    ``on_bytes`` is that of `Log.verify`. Without ``verify`` only the summary and the first messages
+    ``on_bytes`` is as in `Log.verify`. Without ``verify`` only the summary and the first messages
     of a log that lies elsewhere are read, if they suffice. A `LogError` if the log is missing,
     unreadable, or no MCAP log.
     """

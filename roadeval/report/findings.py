@@ -40,7 +40,7 @@ class NotableFrame:
     variant: str
     """The variant that fails or changes; in a table of frames the focus."""
     rates: Mapping[str, Mapping[str, float]]
-    """By variant: the final mask's rates, as in short tables; without truth its signs of doubt."""
+    """The final mask's rates by variant, as in short tables; without truth its signs of doubt."""
     change: float | None = None
     """The filter's effect on ERR, or None."""
     notes: Sequence[str] = ()

@@ -1,7 +1,7 @@
 """Many runs over the same drives: which rate changed in which run.
 
-A run is compared with the runs before it on the drives that both have. A drive whose log, frames or
-truth changed is another drive from then on: its numbers describe other pixels.
+A run is compared with the runs before it on the drives that both have. If a drive's log,
+frames or truth change, it is another drive from then on: its numbers describe other pixels.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ def find_lines(
     ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
     ``part`` of the pixels: its rates as fractions, the drive's ``group``, ``pixels`` as
     `number_pixels` has them, and the columns of the drives' tags; ``tags`` has the names of the
-    tags by column. All lines are one family, see `roadeval.evaluation.stats.steps`; ``confidence``
-    is that of the intervals around levels.
+    tags by column. All lines are one family, see `roadeval.evaluation.stats.steps`. Intervals
+    around levels have this ``confidence``.
     """
     places = {**group_rows(rows, ["variant", "kind", "part"]).indices}
     for column, tag in tags.items():
@@ -190,7 +190,7 @@ def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> li
     for line in lines:
         for step in line.steps:
             last = step.run if step.kind == "outlier" else step.after
-            # The end of a drift, whose beginning is like the level before.
+            # The end of a drift; its beginning is like the level before.
             first = last - (last - step.run) // 4 if step.kind == "drift" else step.run
             runs = range(step.before, step.run), range(first, last + 1)
             changes.append(LineChange(line, step, *_difference(line, *runs, confidence, within)))

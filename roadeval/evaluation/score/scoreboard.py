@@ -135,7 +135,7 @@ class CountedRows:
         self._names: Final = names
         """Columns that name a mask, such as variant and stage."""
         self._rows: Final = array("I")
-        """For each row the place of the frame, the place of the names, and the four counts."""
+        """The place of the frame, the place of the names, and the four counts of each row."""
         self._places: Final[dict[tuple[str, ...], int]] = {}
 
     def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], data.Counts]]) -> None:

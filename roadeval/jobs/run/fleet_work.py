@@ -178,7 +178,7 @@ def stamp_files(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
 
 
 def _check_software(asking: Mapping[str, str], config: RunConfig) -> None:
-    """Raise a FleetError if a worker's software is not that of the command."""
+    """Raise a FleetError if a worker has other software than the command."""
     installed = software(config)
     for name in sorted(asking.keys() | installed.keys()):
         mine, theirs = installed.get(name, "none"), asking.get(name, "none")

@@ -328,7 +328,7 @@ def damage_of(container: Container) -> tuple[Damage, ...]:
 
 
 def sure_until(container: Container) -> int | None:
-    """Return the log time up to which the positions of messages are those of the recording.
+    """Return the log time up to which messages have the same positions as when they were recorded.
 
     They shift after a loss of an unknown number of messages. None if all positions are certain; a
     time before all others if the damage may lie anywhere.
