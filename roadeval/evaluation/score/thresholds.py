@@ -102,9 +102,9 @@ def calibration(counts: Sums) -> dict[str, float]:
     share of pixels that are right at a threshold of one half.
     """
     pixels, p = counts.sum(axis=0), np.arange(CODES) / CERTAIN
-    road, stated = (codes.reshape(LEVELS, -1).sum(axis=1) for codes in (counts[1], pixels * p))
+    road, expected = (codes.reshape(LEVELS, -1).sum(axis=1) for codes in (counts[1], pixels * p))
     sums = {
-        "ECE": np.abs(road - stated).sum(),
+        "ECE": np.abs(road - expected).sum(),
         "confidence": (pixels * np.maximum(p, 1 - p)).sum(),
         "right": pixels.sum() - wrong_above(counts)[round(CERTAIN / 2)],
     }

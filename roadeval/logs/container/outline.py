@@ -11,7 +11,7 @@ from typing import IO, Final
 
 import numpy as np
 
-from roadeval.logs.container.file import ChannelLog, Container, Wanted
+from roadeval.logs.container.file import ChannelLog, ChannelTest, Container
 from roadeval.logs.container.records import (
     IN_MEMORY,
     MESSAGE_INDEX,
@@ -33,7 +33,7 @@ COMPRESSED_BLOCK: Final = 128 << 10
 """Greatest number of bytes that Zstandard needs before it returns the first byte of a block."""
 INDEXES: Final = 4
 """Greatest number of chunks with indexes that are read only for the times of messages."""
-SEVERAL: Final = 100
+MANY: Final = 100
 """Greatest number of messages to read if one is not enough, as of static transforms."""
 
 
@@ -44,9 +44,9 @@ class SummaryScan(Scan):
     """
 
     def __init__(
-        self, source: FileBytes, stamp_of: StampOf, wanted: Wanted, several: Wanted
+        self, source: FileBytes, stamp_of: StampOf, is_wanted: ChannelTest, needs_many: ChannelTest
     ) -> None:
-        self._wanted, self._several = wanted, several
+        self._is_wanted, self._needs_many = is_wanted, needs_many
         self.totals: dict[int, ChannelLog] = {}
         """Number and times of the messages of the whole log, by channel."""
         super().__init__(source, stamp_of)
@@ -60,7 +60,7 @@ class SummaryScan(Scan):
             schema = self.schemas.get(channel.schema_id) if channel else None
             if channel is None or (schema is None and channel.schema_id):
                 raise BadRecord("a channel that the summary does not describe")
-            if self._wanted(channel, schema):
+            if self._is_wanted(channel, schema):
                 needed.setdefault(chunk.offset, set()).add(number)
         ends = Counter(chunk.offset for chunk in (*firsts.values(), *lasts.values()))
         others = [offset for offset, _ in ends.most_common() if offset not in needed][:INDEXES]
@@ -108,8 +108,8 @@ class SummaryScan(Scan):
         size = min(BEGINNING, listed.size)
         for number in channels:
             channel = self.channels[number]
-            needs_several = self._several(channel, self.schemas.get(channel.schema_id))
-            last = np.sort(index[number][:, 1])[:SEVERAL][-1 if needs_several else 0]
+            takes_many = self._needs_many(channel, self.schemas.get(channel.schema_id))
+            last = np.sort(index[number][:, 1])[:MANY][-1 if takes_many else 0]
             following = starts[np.searchsorted(starts, last, side="right") :]
             size = max(size, int(following[0]) if len(following) else listed.size)
         if listed.compression:
@@ -159,16 +159,16 @@ def _ends_of_channels(
 
 
 def outline_of(
-    path: Path, file: IO[bytes], wanted: Wanted, several: Wanted, stamp_of: StampOf
+    path: Path, file: IO[bytes], is_wanted: ChannelTest, needs_many: ChannelTest, stamp_of: StampOf
 ) -> Container | None:
     """Open a log by its summary; None if that is missing, damaged, or incomplete.
 
-    Each ``wanted`` channel has only its first message, or up to `SEVERAL` messages of its first
-    chunk if it needs ``several``. Damage of other parts is not noticed.
+    Each channel that ``is_wanted`` has only its first message, or up to `MANY` messages of its
+    first chunk if it ``needs_many``. Damage of other parts is not noticed.
     """
     with suppress(BadRecord):
-        outline = SummaryScan(FileBytes(file), stamp_of, wanted, several)
-        container = Container(path, outline, wanted)
+        outline = SummaryScan(FileBytes(file), stamp_of, is_wanted, needs_many)
+        container = Container(path, outline, is_wanted)
         for channel_id, total in outline.totals.items():
             read = container.logs.get(channel_id)
             container.logs[channel_id] = replace(total, blocks=read.blocks if read else [])

@@ -126,7 +126,7 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
 
 
 def _use_of(log: ChannelLog) -> tuple[bool, bool]:
-    return log.wanted and log.count > 0, log.count > 0
+    return log.is_wanted and log.count > 0, log.count > 0
 
 
 def median_period(log_times: npt.NDArray[np.int64]) -> int:
@@ -453,7 +453,7 @@ def topic_readers(
     for container in containers:
         for channel_id, channel in sorted(container.channels.items()):
             schema = container.schemas.get(channel.schema_id)
-            log = container.logs.get(channel_id, ChannelLog(wanted=False))
+            log = container.logs.get(channel_id, ChannelLog(is_wanted=False))
             carriers = channels.setdefault(channel.topic, [])
             carriers.append(FileChannel(container, channel, schema, log))
     for topic, carriers in channels.items():
