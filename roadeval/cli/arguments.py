@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
-    """Return an option with its help; a file is checked where it is opened."""
+    """Return an option with its help; a file is checked when it is opened."""
     return typer.Option(*flags.split(), help=text, metavar=metavar, readable=False, **more)
 
 

@@ -124,7 +124,7 @@ class Option:
             autocompletion=(lambda: names) if is_choice else None,
             show_default=False,
             help=self.help,
-            readable=False,  # a file is checked where it is opened
+            readable=False,  # a file is checked when it is opened
             rich_help_panel=self.group,
         )
         return inspect.Parameter(

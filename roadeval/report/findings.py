@@ -137,7 +137,7 @@ class Findings:
 
     @cached_property
     def heatmaps(self) -> Mapping[str, Floats]:
-        """``(2, rows, columns)`` by variant: shares of FP and FN; NaN where never labelled."""
+        """Shares of FP and FN by variant, ``(2, rows, columns)``; NaN in cells never labelled."""
         maps = {}
         for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))

@@ -282,7 +282,7 @@ def _compare_two(
         frames["base"] += _count_frames(base_rows)
         variants = [values_of(rows, "variant") for rows in (base_rows, new_rows)]
         pairs = _pair_frames(base_rows, new_rows, frames)
-        del base_rows, new_rows  # regions take more memory than all else
+        del base_rows, new_rows  # regions take most memory
         common = {*tables.keys_of(pairs)[0]}
         without_frames += [drive_names[key] for key in new_keys.values() if key not in common]
         if not common:
@@ -336,7 +336,7 @@ def _no_common_mask(
         )
     return RoadevalError(
         f"{base} has the variants {', '.join(names)}, and {new} {', '.join(others)}",
-        remedy=f"name those to compare, as --variant {names[0]}={others[0]}",
+        remedy=f"name the variants to compare, as --variant {names[0]}={others[0]}",
     )
 
 

@@ -50,7 +50,7 @@ class Line(NamedTuple):
     title: str
     """The rate and its pixels or drives for people, without the variant."""
     rates: Floats
-    """``(T,)`` mean over the drives of each run; NaN where it has none."""
+    """``(T,)`` mean over the drives of each run; NaN if it has none."""
     levels: Floats
     """``(T,)`` the mean as if every run had the drives of the last run."""
     ends: Floats
@@ -112,7 +112,7 @@ def find_lines(
         drives = part_rows.loc[first, [*KEY, "group"]].astype("str")
         sizes = group_rows(drives.drop_duplicates(), ["group"]).size()
         weights = 1 / drives["group"].map(sizes).to_numpy(float)  # drives of a group share one
-        values = np.full((len(rates), count, len(drives)), np.nan)  # NaN where a run lacks a drive
+        values = np.full((len(rates), count, len(drives)), np.nan)  # NaN if a run lacks a drive
         values[:, part_rows["run"], column] = part_rows[[*rates]].to_numpy().T
         name = {ALL: "", "region": regions.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
         for rate, drive_rates in zip(rates, values, strict=True):

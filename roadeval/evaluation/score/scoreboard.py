@@ -325,7 +325,7 @@ class Scoreboard:
     def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the evaluated frames' ERR at the threshold that is best on the training frames.
 
-        That tells little about a method that learnt from those. See `Curves.at_best_of`.
+        This tells little about a method that learnt from these frames. See `Curves.at_best_of`.
         """
         return self.curves.at_best_of(self._training)
 

@@ -47,7 +47,7 @@ class Difference:
     """A mean of paired differences, new minus base, with its interval. Fractions."""
 
     mean: Annotated[float, BeforeValidator(lambda read: math.nan if read is None else read)]
-    """NaN if no unit has a difference; null where it is read from JSON."""
+    """NaN if no unit has a difference; null in JSON."""
     low: float | None
     high: float | None
     """The interval; within a drive it stays in the range that the base's rate allows. None together

@@ -38,7 +38,7 @@ class Trace(NamedTuple):
 def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
     """Find the steps, drifts and outliers of a rate over runs.
 
-    ``values`` are the mean rates of drives in runs, ``(T, D)``, NaN where a run lacks a drive;
+    ``values`` are the mean rates of drives in runs, ``(T, D)``, NaN if a run lacks a drive;
     ``weights``, ``(D,)``, say how much a drive counts; ``family`` series are searched together.
 
     A run detects a step if two levels fit better than one by h = ``8 / 3 log(365 family / 0.05)``

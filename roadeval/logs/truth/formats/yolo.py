@@ -35,9 +35,9 @@ def _shapes(content: str, size: shapes.Size) -> Iterator[shapes.Shape]:
             if int(label) < 0 or len(ring) % 2 or len(ring) < 4:
                 raise ValueError
         except (ValueError, OverflowError) as error:
-            raise BadMessage(f"line {number} is no class with an outline") from error
+            raise BadMessage(f"line {number} is not a class with an outline") from error
         if max(map(abs, map(float, shares))) > 2:  # rounding makes shares a little more than 1
-            raise BadMessage(f"line {number} has points that are no shares of the image's size")
+            raise BadMessage(f"line {number} has points that are not shares of the image's size")
         if len(ring) == 4:
             x, y, width, height = ring
             left, top = x - width / 2, y - height / 2
