@@ -46,7 +46,7 @@ class RoadevalError(Exception):
         return made
 
     def rename_settings(self, rename: Callable[[str], str]) -> Self:
-        """Return the error with its settings renamed, for example to those of another table."""
+        """Return the error with its settings renamed, for example to settings of another table."""
         made = self.of(self)
         made.setting = rename(self.setting) if self.setting else ""
         for name in ("where", "problem", "remedy"):

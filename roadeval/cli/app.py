@@ -115,7 +115,7 @@ def explain(error: BaseException) -> int:
         case _ if sentence := _fault_of_a_package(error):
             code = ExitCode.FAILED
         case _ if memory.is_lacking(error):
-            code, sentence = ExitCode.FAILED, memory.LACKING
+            code, sentence = ExitCode.FAILED, memory.NOT_ENOUGH
         case _:
             code, sentence = ExitCode.DEFECT, defect(error)
     messages.error(_with_notes(sentence, error), getattr(error, "draft", ""))

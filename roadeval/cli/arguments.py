@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def option(flags: str, text: str, metavar: str | None = None, **more: Any) -> Any:
-    """Return an option with its help; a file is checked where it is opened."""
+    """Return an option with its help; a file is checked when it is opened."""
     return typer.Option(*flags.split(), help=text, metavar=metavar, readable=False, **more)
 
 
@@ -115,9 +115,9 @@ def configuration(options: OptionValues) -> RunConfig:
             config = config.override({"only": options["only"]})
     # By default computed variants come before masks of other methods; here the first typed one is.
     methods, names = ("variants", "nets", "topics.masks", "masks"), config.brought()
-    typed = [name for o in options if o in methods for name, _ in options[o] if name in names]
-    if not config.output.focus and names and names[0] in typed[1:]:
-        config = config.override({"output": {"focus": typed[0]}})
+    typed_names = [name for o in options if o in methods for name, _ in options[o] if name in names]
+    if not config.output.focus and names and names[0] in typed_names[1:]:
+        config = config.override({"output": {"focus": typed_names[0]}})
     if path := options.get("ground"):
         ground = read_camera(path, config.topics.image)
         with in_file(str(path)):

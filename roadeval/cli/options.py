@@ -124,7 +124,7 @@ class Option:
             autocompletion=(lambda: names) if is_choice else None,
             show_default=False,
             help=self.help,
-            readable=False,  # a file is checked where it is opened
+            readable=False,  # a file is checked when it is opened
             rich_help_panel=self.group,
         )
         return inspect.Parameter(
@@ -134,11 +134,11 @@ class Option:
             annotation=Annotated[self.kind | None, option],
         )
 
-    def value(self, typed: Any) -> Any:
-        """Return the value of what was typed; None if nothing was."""
+    def value(self, words: Any) -> Any:
+        """Return the value of the words of an option; None if it was not given."""
         if self.read is None:
-            return None if typed == [] else typed
-        return [self.read(word) for word in typed] if typed else None
+            return None if words == [] else words
+        return [self.read(word) for word in words] if words else None
 
 
 def _make_options() -> Iterator[Option]:
@@ -278,8 +278,8 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
             typed_first = [*context.params]
             in_order = sorted(taken, key=lambda option: typed_first.index(option.argument))
             read = {o.setting: o.value(values.pop(o.argument, None)) for o in in_order}
-            typed = {setting: value for setting, value in read.items() if value is not None}
-            return command(*args, options=typed, **values)
+            options = {setting: value for setting, value in read.items() if value is not None}
+            return command(*args, options=options, **values)
 
         # The options stand after the arguments, and before the command's own options.
         signature = inspect.signature(command, eval_str=True)

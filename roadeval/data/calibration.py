@@ -95,7 +95,7 @@ class Calibration:
     def part(
         self, corner: tuple[int, int], size: tuple[int, int], bins: Sequence[int]
     ) -> Calibration:
-        """Return the calibration of a part of the sensor whose pixels are binned.
+        """Return the calibration of a part of the sensor with binned pixels.
 
         As in ROS, the corner is subtracted before the division by ``bins``. A centre in the exact
         middle stays there.

@@ -1,6 +1,6 @@
 """The palette: one colour for each meaning, in the recording, the figures and the PDF.
 
-The hues are those of Okabe and Ito (https://jfly.uni-koeln.de/color/), which people with any kind
+The hues are Okabe and Ito's (https://jfly.uni-koeln.de/color/), which people with any kind
 of colour vision can distinguish. Colours are sRGB, ``(r, g, b)`` of 0..255 each.
 
 >>> hex_of(FP)

@@ -53,7 +53,7 @@ def as_plain(name: str) -> str:
 
 
 class Counts(NamedTuple):
-    """Pixels by outcome; road is the positive class, ignored pixels are not counted (section 5)."""
+    """Pixels by outcome. Road is the positive class; ignored pixels do not count (section 5)."""
 
     tp: int = 0
     tn: int = 0
@@ -68,7 +68,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Tally:
-    """The counts of one stage of one variant on one frame, in all and by region.
+    """The counts of one stage of one variant on one frame, in the whole frame and by region.
 
     ``rates`` are the fractions of Eq. 24-29 by name; an undefined one is NaN.
     """
@@ -89,7 +89,7 @@ class Change(NamedTuple):
 
 
 Contour = tuple[float, float, Sums]
-"""A final mask's boundary F and boundary IoU, NaN where undefined, and its trimap, ``(w, 2)``."""
+"""A final mask's boundary F and boundary IoU, NaN if undefined, and its trimap, ``(w, 2)``."""
 Transition = tuple[str, str, str, str]
 """A change of masks: variant and stage before, variant and stage after."""
 
@@ -103,7 +103,7 @@ class Output:
     image: Rgb | None = None
     """``(H, W, 3)`` uint8 RGB that replaces the image for the stages after it, if any."""
     mask: Packed | None = None
-    """Its road mask, if any; also among its layers, under the stage's name."""
+    """Its road mask, if any; its layers contain it, too, under the stage's name."""
     regions: Mapping[str, Packed] = field(default_factory=dict)
     """Sets of pixels to count separately, by name."""
     facts: Mapping[str, float] = field(default_factory=dict)
@@ -130,7 +130,7 @@ class StageResult:
 
 @dataclass(frozen=True, eq=False)
 class VariantResult:
-    """The outputs of a variant's stages for one frame, in the order they ran.
+    """The outputs of a variant's stages for one frame, in the order in which they ran.
 
     ``oracles[a][b]`` is the road mask of stage b after the output of stage a was replaced by the
     truth. These masks are no results: see `roadeval.pipeline.chain.Chain`.
@@ -196,7 +196,7 @@ class Doubt:
 
 @dataclass(frozen=True, eq=False)
 class FrameMetres:
-    """Measures of a final mask in metres, for S poses of the camera; the first is calibrated."""
+    """Measures of a final mask in metres for S poses of the camera, the calibrated pose first."""
 
     measures: Sequence[tuple[str, int]]
     """M names, and the metres ahead of each measure; 0 if it has none."""
@@ -216,7 +216,7 @@ class FrameResult:
     ``truth_bits`` is the truth of the counts. ``changes`` are from stage to stage and from final
     mask to final mask. ``contours``, and ``metres`` if the camera is known, measure final masks by
     variant. ``histograms`` count labelled pixels by their probability of road, for each variant and
-    stage with one, and ``above`` does so for the ground seen from above. ``oracles`` are the counts
+    stage with one; ``above`` counts cells of the ground seen from above. ``oracles`` are the counts
     of later stages after one stage is replaced by the truth, by the name of the replaced stage.
     ``disturbed`` has the final masks of the disturbed frame, by the name of the disturbance, such
     as ``fog:2``. ``notes`` are sentences.
@@ -243,8 +243,8 @@ class FrameResult:
     apart: Mapping[str, float] = field(default_factory=dict)
     """ERR by variant of a frame that was labelled because it was in doubt; no total counts it."""
     classes: Mapping[str, Sums] = field(default_factory=dict)
-    """``(256, 3)`` by variant, a row for each code of `Frame.classes`: its pixels, those called
-    road, and the missed road beside it. Empty if the truth has no classes."""
+    """``(256, 3)`` by variant, a row for each code of `Frame.classes`: all its pixels, its pixels
+    called road, and the missed road beside it. Empty if the truth has no classes."""
 
     def without_layers(self) -> FrameResult:
         """Return the result without layers, which take most memory."""
@@ -259,7 +259,8 @@ class FrameResult:
         return replace(self, variants=variants, disturbed=disturbed)
 
 
-Cells = npt.NDArray[Any]
+AnyArray = npt.NDArray[Any]
+"""An array of any shape and type."""
 
 
 T = TypeVar("T")

@@ -1,4 +1,4 @@
-"""Regions: sets of pixels that are counted apart in every labelled frame."""
+"""Regions: sets of pixels that are counted separately in every labelled frame."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Region(NamedTuple):
     in pixels, 0 if unknown, and returns the titles of these names.
     """
     order: int
-    """Its place among the regions."""
+    """Position in tables and reports, the lowest first; equal ones are sorted by file."""
     find: Callable[[LabelledFrame], Mapping[str, Bits]]
     """Computes the regions that a frame has, ``(H, words)`` each, by name."""
 

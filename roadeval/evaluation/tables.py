@@ -1,6 +1,6 @@
 """Tables of counted masks, summed up: totals, windows, pairs, worst frames. A table is a DataFrame.
 
-Rows are those of `roadeval.results.schema.TABLES`, of one drive or of any number. Columns such as
+Rows are as in `roadeval.results.schema.TABLES`, for one drive or any number. Columns such as
 `KEY` and `MASK` name the groups of the sums, and everything follows from the four counts of a row.
 """
 
@@ -55,7 +55,7 @@ def concatenate(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
 
 def only(table: pd.DataFrame, **values: Any) -> pd.DataFrame:
-    """Return the rows whose columns have the given values."""
+    """Return the rows that have the given values in some columns."""
     chosen = np.ones(len(table), bool)
     for name, value in values.items():
         chosen &= (table[name] == value).to_numpy()
@@ -160,7 +160,7 @@ def windows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
 def masks_of(table: pd.DataFrame) -> list[tuple[str, str]]:
     """Return variant and stage of each mask: variants in the table's order, stages as they ran.
 
-    The order of variants is that of their categories, if they are categoricals.
+    Variants are in the order of their categories, if they are categoricals.
     """
     masks = table[MASK].drop_duplicates()
     if masks["variant"].dtype == "category":
@@ -254,7 +254,7 @@ def most_changed_frames(
     apart_ns: int | None = None,
     besides: Sequence[int] = (),
 ) -> pd.DataFrame:
-    """Return the rows whose ``change`` is the greatest rise (``harmed``) or the greatest fall.
+    """Return the rows with the greatest rises (``harmed``) or the greatest falls in ``change``.
 
     Frames without such a change are left out. So are neighbours, as in `worst`, and neighbours of
     the stamps ``besides``.

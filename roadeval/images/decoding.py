@@ -51,7 +51,7 @@ def to_rgb(data: File, limits: Limits, white: float | None = None) -> Rgb:
         pixels = eight_bits(deep, white)
     else:
         pixels = np.array(image.convert("RGB"))
-    return upright(pixels, _left_to_turn(data, limits))
+    return upright(pixels, _remaining_turn(data, limits))
 
 
 def deep_samples(data: File, limits: Limits) -> Array | None:
@@ -69,7 +69,7 @@ def _deep_colours(data: File) -> Array | None:
     """
     import cv2
 
-    # The bits of a sample, and the kind: colours without and with opacity.
+    # These bytes are the bits of a sample and the kind: 2 without opacity, 6 with opacity.
     if _known_format(data).name != "PNG" or bytes(data[24:26]) not in (b"\x10\2", b"\x10\6"):
         return None
     colours: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -83,9 +83,9 @@ def to_labels(data: File, limits: Limits) -> Array:
 
     A file with a palette gives its indices, or its greys if no entry has a colour. Three equal
     channels count as one. An image of a single colour that is transparent in parts gives its
-    opacity. Errors as in `to_rgb`, and if one of several colours is transparent in parts.
+    opacity. An `ImageError` as in `to_rgb`, or if one of several colours is transparent in parts.
     """
-    return upright(_label_values(_decode(data, limits), data), _left_to_turn(data, limits))
+    return upright(_label_values(_decode(data, limits), data), _remaining_turn(data, limits))
 
 
 def _label_values(image: Any, data: File) -> Array:
@@ -94,7 +94,7 @@ def _label_values(image: Any, data: File) -> Array:
     if image.mode == "P":
         indices = np.array(image)
         palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-        # Unused colours count, too: all images of a tool have one palette, and must mean the same.
+        # Unused colours count, too: images of one tool share a palette, and must be read alike.
         greys = (palette == palette[:, :1]).all() and indices.max() < len(palette)
         return np.ascontiguousarray(palette[indices, 0]) if greys else indices
     if image.mode in ("L", *_DEEP):
@@ -130,7 +130,7 @@ def without_colours(image: Rgb) -> Array:
 
 
 def whole_numbers(samples: Array) -> Array:
-    """Return numbers as integers: whole ones as they are, else fractions as levels of 0..255."""
+    """Return numbers as integers: unchanged if all are whole, else fractions as levels 0..255."""
     if samples.dtype.kind != "f":
         return samples
     is_whole = np.isfinite(samples) & (samples == np.rint(samples)) & (np.abs(samples) < 1 << 16)
@@ -166,9 +166,9 @@ def size_of(data: File, limits: Limits) -> tuple[int, int]:
     if format_.plugin is None:
         width, height = _jpeg_size(data)
     else:
-        with _damage_in(format_), _opened(data, format_) as image:
+        with _damage_in(format_), _pillow_image(data, format_) as image:
             width, height = image.size
-    return (height, width) if ORIENTATIONS[_left_to_turn(data, limits)][0] else (width, height)
+    return (height, width) if ORIENTATIONS[_remaining_turn(data, limits)][0] else (width, height)
 
 
 ORIENTATIONS: Final = {
@@ -181,15 +181,15 @@ ORIENTATIONS: Final = {
     7: (1, 1, 1),
     8: (1, 1, 0),
 }
-"""How an image is turned, by EXIF's number: whether rows and columns are exchanged, then whether
-the rows, and the columns, run backwards."""
+"""The turn of an image by EXIF's number: whether rows and columns are exchanged, whether the rows
+then run backwards, and whether the columns do."""
 _MARK_OF_JPEG: Final = b"Exif\0\0"
 _MARKS: Final = (_MARK_OF_JPEG, b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
-"""Every file with an orientation contains one of these, a JPEG the first."""
+"""Every file with an orientation contains one of these marks, and a JPEG the first mark."""
 
 
 def upright(pixels: Array, orientation: int) -> Array:
-    """Return an image, or values, turned by an orientation."""
+    """Return an image, or a label image, turned by an EXIF orientation."""
     exchanged, rows, columns = ORIENTATIONS[orientation]
     turned = pixels.swapaxes(0, 1) if exchanged else pixels
     return np.ascontiguousarray(turned[:: 1 - 2 * rows, :: 1 - 2 * columns])
@@ -200,13 +200,13 @@ def orientation_of(data: File) -> int:
     content, format_ = bytes(data), format_of(data)
     if format_ and any(m in content for m in (_MARKS if format_.plugin else [_MARK_OF_JPEG])):
         plugin = format_.plugin or "Jpeg"
-        with suppress(Exception), _opened(data, format_._replace(plugin=plugin)) as image:
+        with suppress(Exception), _pillow_image(data, format_._replace(plugin=plugin)) as image:
             orientation = image.getexif().get(0x0112)
             return orientation if orientation in ORIENTATIONS else 1
     return 1
 
 
-def _left_to_turn(data: File, limits: Limits) -> int:
+def _remaining_turn(data: File, limits: Limits) -> int:
     """Return the orientation by which to turn a decoded image; Pillow itself turns a TIFF."""
     format_ = format_of(data)
     if (format_ is not None and format_.plugin == "Tiff") is limits.turn:
@@ -220,7 +220,7 @@ def _jpeg_size(data: File) -> tuple[int, int]:
 
     try:
         height, width, *_ = simplejpeg.decode_jpeg_header(data)
-    except (ValueError, KeyError) as error:  # KeyError for an unknown subsampling
+    except (ValueError, KeyError) as error:  # an unknown subsampling is a KeyError
         what = "a JPEG with a damaged head or a rare chroma subsampling"
         raise _jpeg_error(data, what) from error
     return width, height
@@ -246,16 +246,16 @@ def _decode(data: File, limits: Limits) -> Any:
         except ValueError as error:
             raise _jpeg_error(data, f"a damaged JPEG ({error})") from error
     with _damage_in(format_):
-        with _opened(data, format_) as image:
+        with _pillow_image(data, format_) as image:
             limits.check(*image.size)
             image.verify()
-        with _opened(data, format_) as image:
+        with _pillow_image(data, format_) as image:
             image.load()
             return image
 
 
-def _opened(data: File, format_: ImageFormat) -> Any:
-    """Return an image of Pillow; only its head is read."""
+def _pillow_image(data: File, format_: ImageFormat) -> Any:
+    """Return an image of Pillow, which has read only its head."""
     _silence_pillow()
     module = import_module(f"PIL.{format_.plugin}ImagePlugin")
     return getattr(module, f"{format_.plugin}ImageFile")(io.BytesIO(data))

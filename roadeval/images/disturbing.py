@@ -57,7 +57,7 @@ Random = np.random.Generator
 Apply = Callable[[Rgb, float, Light, Random], Rgb]
 """A function of the image, the strength, the depth, and the random generator.
 
-The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN where not known."""
+The depth is ``(H, W)`` metres to the ground, negative above the horizon, NaN if not known."""
 
 
 def exposure(image: Rgb, stops: float, *_: object) -> Rgb:
@@ -73,12 +73,12 @@ def _noisy(light: Light, well: float, random: Random) -> Rgb:
 
 
 def noise(image: Rgb, strength: float, _: Light, random: Random) -> Rgb:
-    """Add the noise of a sensor whose white pixel holds 4096 / 4^(strength - 1) electrons."""
+    """Add the noise of a sensor with 4096 / 4^(strength - 1) electrons in a white pixel."""
     return _noisy(to_light(image), WELL * 4 ** (1 - strength), random)
 
 
 def dark(image: Rgb, stops: float, _: Light, random: Random) -> Rgb:
-    """Divide the light by 2^stops before it falls on the sensor, whose noise stays."""
+    """Divide the light by 2^stops before it falls on the sensor; the sensor's noise stays."""
     return _noisy(to_light(image) * np.float32(2**-stops), WELL, random)
 
 
@@ -167,13 +167,18 @@ def jpeg(image: Rgb, quality: float, *_: object) -> Rgb:
 
 
 class DisturbanceKind(NamedTuple):
-    """A kind of disturbance, with the meaning and the range of its strength."""
+    """A kind of disturbance, such as fog."""
 
     name: str
+    """Its word in ``--disturb`` and, with the strength, in tables and paths: lower-case letters."""
     title: str
+    """What the strength is, such as ``stops of less light``."""
     apply: Apply
+    """Returns the disturbed image as a new array, ``(H, W, 3)`` uint8; not called at strength 0."""
     least: float
+    """Least strength that `Disturbance.parse` takes. If it is negative, strengths have a sign."""
     most: float
+    """Greatest strength that it takes."""
 
 
 BUILT_IN: Final = (
@@ -190,7 +195,7 @@ BUILT_IN: Final = (
 
 @cache
 def kinds() -> Mapping[str, DisturbanceKind]:
-    """Return the kinds by their names, those of other packages last."""
+    """Return the kinds by their names, other packages' kinds last."""
     names = [kind.name for kind in BUILT_IN]
     others = installed("disturbances", DisturbanceKind, SettingError, names)
     return by_name((*BUILT_IN, *others))
@@ -215,7 +220,8 @@ class Disturbance(NamedTuple):
             raise SettingError(f"there is no disturbance {kind!r}", remedy=remedy)
         is_number = re.fullmatch(r"[+-]?\d{1,3}(\.\d{1,3})?", number)
         if not is_number or not allowed.least <= float(number) <= allowed.most:
-            ends = f"from {allowed.least:g} to {allowed.most:g} ({allowed.title}), as {kind}:2"
+            ends = f"from {allowed.least:g} to {allowed.most:g} ({allowed.title})"
+            ends += f", as {kind}:{np.clip(2, allowed.least, allowed.most):g}"
             raise SettingError(f"{text!r}: the strength of {kind} must be {ends}")
         return cls(kind, float(number) + 0.0)
 

@@ -1,4 +1,4 @@
-"""Logs as files: described, packed from images or a video, and the demo that ships."""
+"""Log files: their description, the packing of images or a video, and the demo drive."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def info(
         The configuration of the replay that is planned.
     verify
         Whether the whole log is read, so that all damage is found; a log of at most 50 MB on a disk
-        is always read whole. Otherwise only the summary and the first messages of a log behind a
-        URL are read, if it has a summary.
+        is always read whole. If it is false, and a log at a URL has a summary, only the summary and
+        the first messages are read.
     on_progress
-        Called now and then while the whole log is read, in megabytes.
+        Called now and then while the whole log is read, with megabytes.
 
     Raises
     ------
@@ -77,9 +77,9 @@ def pack(
     output
         The log to write.
     truth
-        A folder of label images, for a folder of images; paired by name.
+        A folder of label images for a folder of images, paired by name.
     rate_hz
-        Images a second; by default the times in the names, a video's own, or 10.
+        Images a second. By default the times in the names or in the video are taken, else 10.
 
     Examples
     --------

@@ -22,7 +22,7 @@ class LostMessageError(FrameError):
 
 
 class BadRecord(Exception):  # noqa: N818  (never leaves this room)
-    """A record that is missing, or whose parts contradict each other."""
+    """A record that is missing, or has parts that contradict each other."""
 
 
 class BadMessage(RoadevalError):  # noqa: N818  (never leaves this room)

@@ -76,7 +76,7 @@ _TIME_WITHIN: Final = re.compile(
 
 
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
-    """List the MCAP files of a log: the file itself, or those of a rosbag2 folder in natural order.
+    """List the MCAP files of a log: the file itself, or a rosbag2 folder's files in natural order.
 
     Files of a folder that are no MCAP files, or are missing, are returned as damage. A file is
     missing if the folder's `METADATA` lists it, or if the others' numbers, from 0, have a gap. A
@@ -282,7 +282,7 @@ def bare_name(file: Path) -> str:
 def times_alone(names: Sequence[str]) -> Sequence[str]:
     """Return names without the text that all of them have before, and after, a time.
 
-    They are unchanged if all times are of one second: it may be that of the recording.
+    They are unchanged if all times are of one second, which may be the time of recording.
 
     >>> times_alone(["cam_1700000000.5_road", "cam_1700000001.5_road"])
     ['1700000000.5', '1700000001.5']

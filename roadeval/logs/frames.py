@@ -200,7 +200,7 @@ def settle(
 ) -> Selection:
     """Return the selection of a log's topics; `choose_truth` explains ``of_rig``.
 
-    Errors are those of `Log.select`.
+    Errors are as in `Log.select`.
     """
     settings = config.topics
     topics = [_with_frame_id(topic, readers[topic.name], settings.frame_id) for topic in topics]
@@ -323,7 +323,7 @@ class Accounting:
     repeated: int = 0
     """Frames returned that repeat an earlier one, by stamp and content."""
     labels_repeated: int = 0
-    """Labelled frames whose label equals an earlier one bit for bit."""
+    """Labelled frames with a label that equals an earlier one bit for bit."""
     frame_ids: Counter[str] = field(default_factory=Counter)
     """Frames by the ``frame_id`` of their images."""
     undecodable: dict[int, str] = field(default_factory=dict)

@@ -109,23 +109,23 @@ def open_log(
     frames = config.frames
     limits = Limits(frames.max_pixels, turn=not frames.unturned, full_range=frames.full_range)
 
-    def wanted(*channel: Any) -> bool:
+    def is_wanted(*channel: Any) -> bool:
         return every_topic or kind_of(*channel) is not TopicKind.OTHER
 
-    def several(*channel: Any) -> bool:
+    def needs_many(*channel: Any) -> bool:
         return kind_of(*channel) is TopicKind.TRANSFORMS
 
     try:
         outline = None
         if by_summary and opened is not None:
-            outline = outline_of(path, opened, wanted, several, message_stamp)
+            outline = outline_of(path, opened, is_wanted, needs_many, message_stamp)
         containers = (
             [outline]
             if outline
             else [
                 container
                 for file in files
-                for container in containers_in(file, wanted, message_stamp, opened=opened)
+                for container in containers_in(file, is_wanted, message_stamp, opened=opened)
             ]
         )
         readers = topic_readers(containers, limits, lacks_files=bool(damage))
@@ -505,7 +505,7 @@ def describe(
     """Describe a log by its summary and indexes, and what a replay would choose of it.
 
     With ``verify``, or if it has at most `SMALL` bytes, it is read completely to find all damage;
-    ``on_bytes`` is that of `Log.verify`. Without ``verify`` only the summary and the first messages
+    ``on_bytes`` is as in `Log.verify`. Without ``verify`` only the summary and the first messages
     of a log that lies elsewhere are read, if they suffice. A `LogError` if the log is missing,
     unreadable, or no MCAP log.
     """

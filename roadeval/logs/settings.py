@@ -130,7 +130,7 @@ class TopicSettings:
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """One of several cameras of a log: its topics, in place of those of ``[topics]``."""
+    """One of several cameras of a log: its topics, which replace ``[topics]``."""
 
     image: Annotated[str, Len(min_length=1)]
     """The topic of its images."""

@@ -48,8 +48,8 @@ class Network:
         """Find the road in an ``(H, W, 3)`` uint8 RGB image.
 
         Logits and probabilities of a class are interpolated linearly to the frame's size; numbers
-        of classes are resized to the nearest pixel. With several outputs the probability of road is
-        the greatest of theirs. The output has no probabilities if the network gives only classes. A
+        of classes are resized to the nearest pixel. If there are several outputs, the greatest
+        probability of road counts. There are no probabilities if the network gives only classes. A
         `NetworkError` if the network fails on the image, or gives NaN or another shape than for
         other images.
         """
@@ -342,7 +342,7 @@ SLACK: Final = 1 / 64
 
 
 def is_probable(low: float, high: float) -> bool:
-    """Return whether a range is that of probabilities, maybe quantised ones."""
+    """Return whether numbers of a range can be probabilities, maybe quantised ones."""
     return low >= -SLACK and high <= 1 + SLACK
 
 
@@ -407,7 +407,7 @@ def as_scores(output: Array, layout: str | None) -> Array | None:
     """Return an output as classes, rows and columns; None if it is no map of the image.
 
     A map is ``(1, C, h, w)``, or ``(1, h, w, C)`` if the input's layout is ``NHWC``; the first
-    dimension, or that of the classes, may be absent.
+    dimension, or the dimension of the classes, may be absent.
     """
     array = output[0] if output.ndim > 2 and len(output) == 1 else output
     if array.ndim == 3 and layout == "NHWC" and len(array) != 1:

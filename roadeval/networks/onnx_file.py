@@ -154,9 +154,9 @@ class OnnxFile:
 
 
 def load(settings: NetSettings) -> OnnxFile:
-    """Open the network of some settings; one whose file did not change stays open.
+    """Open the network of some settings; it stays open while its file does not change.
 
-    A `NetworkError` if the file cannot be used, or its SHA-256 is not that of the settings.
+    A `NetworkError` if the file cannot be used, or the settings state another SHA-256.
     """
     if not settings.file:
         remedy = "give the path of an ONNX file"

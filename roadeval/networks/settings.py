@@ -29,14 +29,15 @@ class NetSettings:
         ``config.json`` and ``preprocessor_config.json``.
     sha256: Expected SHA-256, in hexadecimal, of the network's bytes, followed by its weight files
         and the JSON files of its folder. A network with another one is an error.
-    size: Width and height of the input in pixels. Default: those that the file states.
+    size: Width and height of the input in pixels. Default: as the file states.
     resize: Way to resize an image to the input, with linear interpolation. ``stretch``, the
         default: each side by itself. ``letterbox``, as for Ultralytics' networks: both sides by one
         factor, so that the image fits into the middle of a grey area.
-    stride: The sides of a letterbox are the least multiples of this number of pixels that hold the
-        image, for a network that takes any size. Default: all letterboxes have ``size``.
+    stride: Step of a letterbox's sides in pixels, for a network that takes any size: the sides are
+        the least multiples that hold the image. Default: all letterboxes have ``size``.
     antialias: Whether a pixel of a reduced image is a mean of all pixels that it covers, as with
-        Pillow's bilinear filter; ``bicubic`` uses that filter. Default: no; for Hugging Face yes.
+        Pillow's bilinear filter; ``bicubic`` uses that filter. Default: yes for a folder of Hugging
+        Face, else no.
     layout: Order of the input's dimensions: N images, C channels, H rows, W columns.
     channels: Order of the input's channels, by default ``rgb``. ``grey``: a single channel.
     scale: Factor of the grey levels 0..255. Default: 1/255, or 1 if the network takes integers.
@@ -48,11 +49,12 @@ class NetSettings:
     road: Numbers of the classes that are road, from 0.
     activation: Way to make probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of
         each, or ``none`` if it holds probabilities, the default if test images give only numbers
-        from 0 to 1. ``classes``: it holds numbers of classes, the default for integers.
+        from 0 to 1. ``classes``: the output holds numbers of classes, the default for integers.
     decide: Rule for road: a class of ``road`` beats all others (``argmax``), or the probability of
         road is above ``threshold``.
     threshold: Number from 0 to 1, by default 0.5; if it is set, ``decide`` is ``threshold`` by
-        default. With ``argmax`` it is the least share of road's best class in the best two.
+        default. With ``argmax`` the best class of road is compared with the best other class: the
+        threshold is the least share of road in the two.
     seconds: Longest time for an image, in seconds. A network that takes longer fails.
     megabytes: Greatest memory of the input or an output, in MiB. All arrays of an image together
         may take eight times that.
@@ -93,7 +95,7 @@ class NetSettings:
 
     @field_validator("outputs", "road")
     @classmethod
-    def _check_names(cls, named: tuple[object, ...] | None) -> tuple[object, ...] | None:
-        if named is not None and (not named or len(set(named)) < len(named)):
+    def _check_names(cls, names: tuple[object, ...] | None) -> tuple[object, ...] | None:
+        if names is not None and (not names or len(set(names)) < len(names)):
             raise ValueError("must name at least one, and each once")
-        return named
+        return names

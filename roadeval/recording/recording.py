@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import ERRORS, VariantLayout
 from roadeval.data.arrays import Plane
-from roadeval.data.result import Cells
+from roadeval.data.result import AnyArray
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError, SeveralCamerasError
 from roadeval.recording.rrd_file import TEXT, RrdFile, name_damage
@@ -173,7 +173,7 @@ class Recording:
         """Return the truth, ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored."""
         return self._array(at.TRUTH_PATH, frame)
 
-    def layer(self, variant: str, name: str, frame: int) -> Cells:
+    def layer(self, variant: str, name: str, frame: int) -> AnyArray:
         """Return a layer of a variant on a frame.
 
         A `RecordingError` if there is no such layer, or none on this frame. A `DamagedError` if it
@@ -214,7 +214,7 @@ class Recording:
                 check_texts(sentences)
         return {frame: tuple(sentences) for frame, sentences in notes.items()}
 
-    def _array(self, path: str, frame: int) -> Cells:
+    def _array(self, path: str, frame: int) -> AnyArray:
         if path not in self._codecs:
             remedy = f"there are {', '.join(sorted(self._codecs))}"
             raise RecordingError(f"there is no {path}", where=self.path, remedy=remedy)

@@ -42,7 +42,7 @@ class Block:
         return type(self).__name__.lower()
 
     def as_json(self) -> dict[str, Any]:
-        """Return the block's kind and its fields for JSON; an image file is its name.
+        """Return the block's kind and its fields for JSON; an image file becomes its name.
 
         `roadeval.runtime.text.visible` is applied to every text.
         """
@@ -119,11 +119,11 @@ class BulletList(Block):
 
     title: str
     items: Sequence[str | Reason]
-    """On a page the frames of a reason are links to them."""
+    """Sentences and reasons; a page makes links of the frames that a reason names."""
     tone: str = "plain"
     """``plain`` or ``warning``."""
     focus: str = ""
-    """The variant in question: a page shows the list while it is the focus. Empty: always."""
+    """The variant that must be the focus for a page to show the list; always shown if empty."""
     on_paper: bool = True
 
 
@@ -321,7 +321,7 @@ class DriveRow(Block):
 
 @dataclass(frozen=True)
 class LinkList(Block):
-    """Titles of links with their addresses; paper has none."""
+    """Titles of links with their addresses; paper shows no links."""
 
     links: Sequence[tuple[str, str]]
     command: str = ""

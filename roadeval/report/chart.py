@@ -98,7 +98,7 @@ class Series:
     x: Sequence[float]
     """Frame numbers, or positions in `Chart.names`; rising."""
     y: Sequence[float]
-    """A number at each position, in the chart's unit; NaN where undefined."""
+    """A number at each position, in the chart's unit; NaN if undefined."""
     low: Sequence[float] = ()
     high: Sequence[float] = ()
     """Ends of an interval around each number, or none at all."""

@@ -79,7 +79,7 @@ def _mermaid(kind: str, height: int, colours: Sequence[str], *lines: str) -> str
 
 
 def standing(comparison: Comparison, limits: Sequence[Judgement]) -> tuple[MaskChange, str, str]:
-    """Return a surely worse mask, else the focus; its ERR in words; and a word for its change."""
+    """Return a surely worse mask, else the focus; a text with its ERR; a word for its change."""
     masks = comparison.finals() or comparison.changes
     focus = focus_of([row.variant for row in masks])
 

@@ -28,7 +28,7 @@ Inspect = Callable[[str, int], str]
 Row = MaskChange | MovedFrame | compare.RegionChange | compare.DriveChange | compare.ClassChange
 """A fact about a variant of a new result."""
 Columns = dict[str, Callable[[Any], Cell | str]]
-"""For the title of each column, the function that makes the cell of a row."""
+"""The functions that make the cells of a row, by the titles of the columns."""
 NAMED: Final = 20
 """Greatest number of drives in the table of a mask's changed drives."""
 CHANGE: Final = ("base %", "new %", "change", "interval")

@@ -40,7 +40,7 @@ class NotableFrame:
     variant: str
     """The variant that fails or changes; in a table of frames the focus."""
     rates: Mapping[str, Mapping[str, float]]
-    """By variant: the final mask's rates, as in short tables; without truth its signs of doubt."""
+    """The final mask's rates by variant, as in short tables; without truth its signs of doubt."""
     change: float | None = None
     """The filter's effect on ERR, or None."""
     notes: Sequence[str] = ()
@@ -137,7 +137,7 @@ class Findings:
 
     @cached_property
     def heatmaps(self) -> Mapping[str, Floats]:
-        """``(2, rows, columns)`` by variant: shares of FP and FN; NaN where never labelled."""
+        """Shares of FP and FN by variant, ``(2, rows, columns)``; NaN in cells never labelled."""
         maps = {}
         for (name,), cells in group_rows(self.table("heat"), ["variant"]):
             rows, columns = (cells[edge] // cells["side"] for edge in ("top", "left"))

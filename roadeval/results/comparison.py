@@ -9,7 +9,7 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from roadeval.data.words import listing, percent, plain_points, setting
-from roadeval.evaluation.comparison.compare import FALSE, Comparison, MaskChange
+from roadeval.evaluation.comparison.compare import FALSE_DISCOVERY_RATE, Comparison, MaskChange
 from roadeval.evaluation.comparison.conditions import Judgement
 from roadeval.evaluation.metrics import TESTED
 from roadeval.evaluation.stats.difference import Difference
@@ -30,7 +30,7 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         "verdict": verdict(comparison),
         "where": where(comparison),
         **asdict(comparison),
-        "false_discovery_rate": FALSE,
+        "false_discovery_rate": FALSE_DISCOVERY_RATE,
         "conditions": [*map(condition_of, judgements)],
     }
 
@@ -146,7 +146,7 @@ def changed_drives(comparison: Comparison) -> list[str]:
         lines.append(
             f"{_mask_name(*mask)}: {TESTED} surely changed on {len(changed)} of {tested} drives "
             f"(worse on {worse}, better on {len(changed) - worse}; false discovery rate "
-            f"{percent(FALSE, 0)} %)"
+            f"{percent(FALSE_DISCOVERY_RATE, 0)} %)"
         )
     return lines
 
@@ -178,8 +178,9 @@ def headline(holds: Sequence[bool | None]) -> str:
 
 
 DISCOVERY: Final = (
-    f"Of the drives that are called changed, at most {percent(FALSE, 0)} % on average are not "
-    "(Benjamini and Hochberg's correction over the drives; q is the p-value after it)."
+    f"On average at most {percent(FALSE_DISCOVERY_RATE, 0)} % of the drives that are called "
+    "changed are not (Benjamini and Hochberg's correction over the drives; q is the p-value after "
+    "it)."
 )
 
 

@@ -318,8 +318,8 @@ class Facts(FactsFile):
     curves: Totals = field(default_factory=dict)
     """Key figures over all thresholds, by variant and stage with a probability of road."""
     thresholds: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """The thresholds on the probability of road, of variants that learn nothing: ``own`` is in use,
-    ``threshold`` is best on the training frames, ``ERR`` is that of all evaluated pixels at
+    """The thresholds on the probability of road of variants that learn nothing: ``own`` is in use,
+    ``threshold`` is best on the training frames, ``ERR`` is the rate of all evaluated pixels at
     ``threshold``, and ``lines`` are the settings that set it."""
     effects: list[Effect] = field(default_factory=list)
     """The paired differences of the drive."""
@@ -390,7 +390,7 @@ class Facts(FactsFile):
         """Return the parts of the file, with differences by the variant that is subtracted.
 
         ``difference`` is filtered minus unfiltered, by stage. The other parts hold, by variant, the
-        final mask minus that of ``unfiltered``, of ``blind``, or of the method that was tuned.
+        final mask minus the final mask of ``unfiltered``, ``blind``, or the method that was tuned.
         """
         names = "difference", "against_unfiltered", "against_blind", "against_method"
         parts: dict[str, dict[str, Any]] = {name: {} for name in names}

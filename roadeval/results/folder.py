@@ -53,7 +53,7 @@ CONTENT: Final = Content(SUMMARY, names_of_results)
 
 
 class ResultsWriter:
-    """Writes a results folder while frames arrive; it is a context.
+    """Writes a results folder while frames arrive; it is a context manager.
 
     The folder takes its name at the end of the context if `finish` was called. After an exception,
     or without `finish`, it is removed, and earlier results stay. Every method raises a
@@ -64,19 +64,19 @@ class ResultsWriter:
     def __init__(self, folder: Path, *, packed: bool = False) -> None:
         self._new = NewFolder(folder, CONTENT)
         self._packed = packed
-        self._open: dict[str, _Growing] = {}
+        self._open: dict[str, _GrowingTable] = {}
         self._finished = False
 
     @property
     def folder(self) -> Path:
-        """The folder of the files until the end; figures are written there, too."""
+        """The folder of the files until they are published; figures are written there, too."""
         return self._new.partial
 
     def __enter__(self) -> Self:
         with self.explain_errors():
             self._new.begin()
             for name in OF_A_DRIVE:
-                self._open[name] = _Growing(self.folder, TABLES[name], self._packed)
+                self._open[name] = _GrowingTable(self.folder, TABLES[name], self._packed)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -99,7 +99,7 @@ class ResultsWriter:
     @property
     def tables(self) -> dict[str, TableFacts]:
         """The tables that have rows so far."""
-        return {name: table.stated for name, table in self._open.items() if table.rows}
+        return {name: table.facts for name, table in self._open.items() if table.rows}
 
     def finish(self, facts: Facts, run_toml: str) -> Facts:
         """Write ``summary.json`` and ``run.toml``; return the facts with the tables and files.
@@ -124,7 +124,7 @@ class ResultsWriter:
         return writing(self._new.path, partial(ResultsError, remedy=remedy))
 
 
-class _Growing:
+class _GrowingTable:
     """A table to which lines are appended."""
 
     def __init__(self, folder: Path, table: TableSchema, packed: bool) -> None:
@@ -136,7 +136,7 @@ class _Growing:
         self.append(table.header)
 
     @property
-    def stated(self) -> TableFacts:
+    def facts(self) -> TableFacts:
         """The rows so far, and the SHA-256 of the text."""
         return TableFacts(self.rows, self._digest.hexdigest())
 
@@ -160,7 +160,7 @@ class ResultsFolder:
         self.facts = self._facts_of_all.cameras[camera] if camera else self._facts_of_all
 
     def table(self, name: str, masks: Collection[tuple[str, str]] | None = None) -> pd.DataFrame:
-        """Read a table by its name in `roadeval.results.schema.TABLES`, of some masks or of all.
+        """Read a table of `roadeval.results.schema.TABLES` by its name, for some masks or for all.
 
         A table that was not written is empty. A `ResultsError` if it is damaged, or not the one
         that the summary states.

@@ -214,7 +214,7 @@ def _warnings(
 
 
 def _misfits(drives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield a sentence on the drives where truth or masks do not fit the images."""
+    """Yield a sentence on the drives with truth or masks that do not fit the images."""
     rows = [row for row in drives if row["misfits"]]
     if rows:
         names = listing([row["drive"] for row in rows[:WARNINGS]])

@@ -64,7 +64,7 @@ class TableFacts:
 def read_table(
     name: str,
     source: Path | str,
-    stated: Mapping[str, TableFacts] | None = None,
+    facts: Mapping[str, TableFacts] | None = None,
     camera: str = "",
     masks: Collection[tuple[str, str]] | None = None,
 ) -> pd.DataFrame:
@@ -72,12 +72,12 @@ def read_table(
 
     ``name`` is one of `roadeval.results.schema.TABLES`; ``source`` is a CSV file, which may be
     compressed with gzip, or its text with the header line. A file that does not exist has no rows,
-    like an empty text. ``stated`` are the facts that the summary states of each table, by name: a
-    table that it does not state must be empty. It is None if there is no summary. With ``camera``
+    like an empty text. ``facts`` are the summary's facts of each table, by name: a table
+    without facts must be empty. It is None if there is no summary. With ``camera``
     only the rows of that camera are returned, and with ``masks`` only rows of these variants and
     stages; other rows take no memory. Names are categoricals of text, even if they look like
     numbers; rates are float64, all other numbers int64. A `ResultsError` if the table is damaged,
-    or not the one that is stated.
+    or does not have these facts.
     """
     import pyarrow as pa
 
@@ -95,9 +95,9 @@ def read_table(
         raise ResultsError(f"{where}: {error.strerror}") from error
     try:
         with file:
-            if stated is not None:
-                _check_stated(where, file, stated.get(name))
-            lines = file.readlines() if stated is None else []
+            if facts is not None:
+                _check_facts(where, file, facts.get(name))
+            lines = file.readlines() if facts is None else []
             if len({*lines}) < len(lines):
                 raise ValueError("a row is there twice")
             # The file was read to its end. If the end is its beginning, the file has no header.
@@ -129,16 +129,16 @@ def _open_csv(path: Path) -> BinaryIO:
     return BytesIO(content)
 
 
-def _check_stated(where: Path | str, file: BinaryIO, stated: TableFacts | None) -> None:
+def _check_facts(where: Path | str, file: BinaryIO, facts: TableFacts | None) -> None:
     digest, ends = hashlib.sha256(), 0
     for part in iter(partial(file.read, 1 << 20), b""):
         digest.update(part)
         ends += part.count(b"\n")
     rows = max(ends - 1, 0)
     actual = TableFacts(rows, digest.hexdigest())
-    if actual == stated or (stated is None and not rows):
+    if actual == facts or (facts is None and not rows):
         return
-    stated_rows = stated.rows if stated else 0
+    stated_rows = facts.rows if facts else 0
     if rows != stated_rows and isinstance(where, str):
         raise ResultsError(
             f"{where}: it is a part, or several runs in one, as `rerun rrd` splits and merges them "

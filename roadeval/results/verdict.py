@@ -32,7 +32,7 @@ FEW: Final = 5
 WORDS: Final = 60
 """Greatest number of words of a verdict; a longer verdict does not explain the baseline."""
 WEAK: Final = 0.02
-"""From this error rate on the preset ``robust`` is worth a try."""
+"""Least error rate at which the preset ``robust`` is worth a try."""
 ROBUST: Final = "robust"
 LOOKED_AT: Final = 10
 """Greatest number of frames without truth that are worth a look."""

@@ -84,7 +84,7 @@ def package_of(point: EntryPoint) -> str:
 
 
 def versions_of_additions() -> dict[str, str]:
-    """Return the versions of the packages whose additions take part in every run."""
+    """Return the versions of the packages with additions that take part in every run."""
     points = (point for kind in KINDS if kind != "stages" for point in points_of(kind))
     return {package_of(point): point.dist.version for point in points if point.dist}
 

@@ -187,7 +187,7 @@ class Content:
 
 
 class NewFolder:
-    """A folder that is written as ``partial``, and whose files take their places together.
+    """A folder that is written as ``partial``; its files take their places together.
 
     It is written inside the target folder. `publish` removes the old seal first and moves the new
     one last; `claim_folder` completes the moves of a killed run. If ``path`` is a link, its target

@@ -11,15 +11,16 @@ from typing import Final
 
 from roadeval.runtime.sentence import Sentence
 
-LACKING: Final = Sentence(
+NOT_ENOUGH: Final = Sentence(
     "not enough memory: take fewer {run.jobs}, a smaller {frames.scale}, or a larger machine"
 )
 _LACKING: Final = re.compile(
     "(allocat|map segment|new thread|create thread|Insufficient memory|out of memory|bad_alloc)",
     re.IGNORECASE,
 )
+"""Words of libraries' errors about memory."""
 LARGEST: Final = 32 << 20
-"""Size of the largest arrays whose memory `reuse` keeps."""
+"""Bytes of the largest arrays that `reuse` keeps in memory."""
 M_TRIM_THRESHOLD: Final = -1
 M_MMAP_THRESHOLD: Final = -3
 """Numbers of the parameters that `reuse` sets, from glibc's ``malloc.h``."""
@@ -58,7 +59,7 @@ def resident() -> int:
 
 
 def is_lacking(error: BaseException) -> bool:
-    """Return whether an error, of Python or of a library, means that memory is too small.
+    """Return whether an error, of Python or of a library, means that there is not enough memory.
 
     >>> is_lacking(RuntimeError("can't start new thread"))
     True

@@ -47,8 +47,7 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     assert change.base["ERR"] == pytest.approx(0.10)
     assert change.difference["ERR"].mean == pytest.approx(0.03)
     assert found.warnings == (
-        "2 frames that base evaluated are left out against new, which lacks them or trained on "
-        "them",
+        "2 frames that base evaluated are left out, because new lacks them or trained on them",
     )
 
 
@@ -88,8 +87,8 @@ def test_settings_that_differ_are_named_with_both_values():
     assert found.changed_settings == {"new": of_the_log | of_files | {"svm.c": (1, 2)}}
     assert found.warnings == (
         "base and new were replayed with different settings (`frames.scale` 1 and 0.5, "
-        "`labels.road` not given and 3): part of the change may be theirs",
-        "the truth differs on 2 frames between base and new: part of the change may be the truth's",
+        "`labels.road` not given and 3), which may cause a part of the change",
+        "the truth differs on 2 frames between base and new, which may cause a part of the change",
     )
 
 

@@ -10,8 +10,16 @@ import pytest
 from PIL import Image
 
 from roadeval.errors import SettingError
+from roadeval.images import disturbing
 from roadeval.images.decoding import deep_samples, palette_indices, size_of, to_labels, to_rgb
-from roadeval.images.disturbing import BUILT_IN, Disturbance, assumed_depth, to_codes, to_light
+from roadeval.images.disturbing import (
+    BUILT_IN,
+    Disturbance,
+    DisturbanceKind,
+    assumed_depth,
+    to_codes,
+    to_light,
+)
 from roadeval.images.formats import ImageError, Limits, format_of
 from tests.fixtures.drives import scene as road_scene
 from tests.images.making import (
@@ -360,3 +368,13 @@ def test_a_disturbance_has_a_plain_name_and_the_text_that_makes_it(text, name, s
 def test_a_wrong_disturbance_is_told_with_what_is_allowed(text, says):
     with pytest.raises(SettingError, match=says):
         Disturbance.parse(text)
+
+
+@pytest.mark.parametrize(("least", "most"), [(0, 12), (0, 1), (5, 9)])
+def test_a_wrong_strength_is_told_with_an_example_that_is_allowed(least, most, monkeypatch):
+    kind = DisturbanceKind("haze", "share of white", lambda image, *_: image, least, most)
+    monkeypatch.setattr(disturbing, "kinds", lambda: {"haze": kind})
+    with pytest.raises(SettingError) as told:
+        Disturbance.parse("haze:99")
+    example = str(told.value).rpartition(" as ")[2]
+    assert least <= Disturbance.parse(example).strength <= most

@@ -24,12 +24,17 @@ FILES = {
     found["path"]: found["text"]
     for found in FENCED.finditer((ROOT / "CONTRIBUTING.md").read_text())
 }
+DISTURBANCE = re.compile(
+    r"^```python\n(def haze.*?)```.*?`(DisturbanceKind.*?)`", re.DOTALL | re.MULTILINE
+)
+"""The function of the page's disturbance, and its kind."""
 PERIOD_NS = 100_000_000
 FRAMES = 22
 
 
 COMMANDS = {
-    "replay": "replay drive.mcap --variant bright=bright.toml --save out.rrd --reports reports",
+    "replay": "replay drive.mcap --variant bright=bright.toml --disturb haze:0.4 --save out.rrd "
+    "--reports reports",
     "report": "report out.rrd -o report.pdf",
     "config": "config --variant bright=bright.toml",
     "compared": "compare out.rrd -o compared.pdf --json",
@@ -130,6 +135,10 @@ def workshop(tmp_path_factory) -> Workshop:
         assert not place.exists(), f"{path} is there already"
         assert place.parent.is_dir(), f"{path} has no folder to lie in"
         place.write_text(text)
+    disturbing = folder / "roadeval" / "images" / "disturbing.py"
+    function, kind = DISTURBANCE.search((ROOT / "CONTRIBUTING.md").read_text()).groups()
+    before, head, after = disturbing.read_text().partition("BUILT_IN: Final = (\n")
+    disturbing.write_text(f"{before}{function}\n\n{head}    {kind},\n{after}")
     write_drive(folder / "drive.mcap")
     write_polygons(folder / "polygons")
     process = subprocess.run(
@@ -171,6 +180,14 @@ def test_the_page_adds_one_of_each():
             *("logs/messages/encodings", "logs/truth/formats", "jobs", "cli/commands"),
         )
     }
+
+
+def test_its_files_pass_the_lint(workshop):
+    pytest.importorskip("ruff")
+    paths = [path for path in FILES if path.endswith(".py")]
+    words = [sys.executable, "-m", "ruff", "check", "--config", ROOT / "pyproject.toml", *paths]
+    checked = subprocess.run(words, cwd=workshop.folder, capture_output=True, check=False)
+    assert checked.returncode == 0, checked.stdout.decode()
 
 
 def test_the_stage_has_rows_a_mask_in_the_recording_and_documented_settings(workshop, recording):
@@ -239,6 +256,13 @@ def test_the_label_format_gives_the_same_truth(workshop):
 def test_the_figure_is_in_the_report(report):
     assert "Accuracy by windows." in report
     assert report.count("ACC: accuracy, %") == 1
+
+
+def test_the_disturbance_makes_more_errors(workshop):
+    hazy = workshop.table("disturbances").query("variant == 'bright' and disturbance == 'haze-0_4'")
+    undisturbed = workshop.table("frames").query("variant == 'bright' and stage == 'post'")
+    assert set(hazy["frame"]) == set(undisturbed["frame"])
+    assert hazy["FP"].sum() > undisturbed["FP"].sum()
 
 
 def test_the_command_runs(workshop):

@@ -50,10 +50,10 @@ def audit(
         roadeval audit drive.mcap --truth labels/ -o to_check
         roadeval audit recordings/drive.rrd --annotator b
 
-    A label looks wrong where it contradicts methods that are right elsewhere, or the labels before
-    and after; where it has specks or holes; and where it fits better mirrored, moved, or on another
-    frame. FOLDER/suspects shows where, FOLDER/proposals has the present labels; put the corrected
-    labels into FOLDER/labels. 'replay --truth FOLDER' reads them in place of the drive's own.
+    A label looks wrong if it contradicts methods that are right elsewhere, or the labels before
+    and after; if it has specks or holes; or if it fits better mirrored, moved, or on another
+    frame. FOLDER/suspects shows these places, and FOLDER/proposals has the present labels; put the
+    corrected labels into FOLDER/labels. 'replay --truth FOLDER' reads these instead of the drive's.
     """
     if options and (source.suffix == ".rrd" or (source / "summary.json").is_file()):
         raise typer.BadParameter(f"{source}: a result has its truth and masks; give the log")

@@ -12,16 +12,16 @@ Results = Annotated[
     list[str],
     arguments.argument(
         "BASE NEW...",
-        "Recordings, results folders, fleets or URLs; of a single one variants are compared.",
+        "Recordings, results folders, fleets or URLs; a single one has its variants compared.",
     ),
 ]
 Variants = Annotated[
     list[str] | None,
     arguments.option(
         "--variant",
-        "Variant to compare, the others are left out; a=b compares the base's a with the new "
-        "result's b. For a single result the first one is the base. Repeatable.",
-        "NAME|BASE'S=NEW'S",
+        "Variant to compare; others are left out. a=b compares a of the base with b of the new "
+        "result. The first variant of a single result is its base. Repeatable.",
+        "NAME|BASE=NEW",
     ),
 ]
 Outputs = Annotated[
@@ -35,7 +35,7 @@ Outputs = Annotated[
 ]
 Junit = Annotated[
     Path | None,
-    arguments.option("--junit", "File of JUnit's XML with a case for each condition.", "FILE"),
+    arguments.option("--junit", "JUnit XML file with a case for each condition.", "FILE"),
 ]
 Markdown = Annotated[
     Path | None,
@@ -54,7 +54,7 @@ def compare(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Compare results with the first, or the variants of one.
+    """Compare results, or the variants of one result.
 
         roadeval compare old.rrd new.rrd
         roadeval compare old.rrd new.rrd --fail-if "post.filtered.ERR > +0.5pp"
@@ -67,24 +67,24 @@ def compare(
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs.outputs import holding
-    from roadeval.jobs.results import compare as comparing
+    from roadeval.jobs.results import compare as job
     from roadeval.jobs.results.history import list_results
 
     options = [f"--variant={name}" for name in variant or ()]
     options += [f"--fail-if={condition}" for condition in fail_if or ()]
-    typed = shlex.join(["roadeval", "compare", *map(str, results), *options])
+    command = shlex.join(["roadeval", "compare", *map(str, results), *options])
     files = [(path, "") for path in output or ()]
     files += [(path, kind) for path, kind in ((junit, "junit"), (markdown, "comment")) if path]
     listing = list_results(results)
     with holding(*(path for path, _ in files), inputs=listing.paths):
         with progress.show(quiet or json) as watch:
-            compared = comparing.compare(
+            compared = job.compare(
                 listing, variants=variant, fail_if=fail_if or [], on_progress=watch
             )
         for path, kind in files:
-            comparing.write(compared, path, kind, typed)
+            job.write(compared, path, kind, command)
     if json:
-        console.emit(comparing.as_json(compared).rstrip())
+        console.emit(job.as_json(compared).rstrip())
     elif not quiet:
         screen.show(compared.comparison, compared.judgements, console.results())
     for warning in compared.comparison.warnings:

@@ -54,9 +54,9 @@ def inspect(
         roadeval inspect recordings/drive.rrd --list
         roadeval inspect recordings/drive.rrd --worst 1 --screenshot worst.png
 
-    The viewer works offline and listens on 127.0.0.1 alone. Of each scene only the worst frame
-    is listed. In a fleet the frames of all drives are ranked together, and the worst one
-    opens by default.
+    The viewer works offline and listens on 127.0.0.1 alone. The list has only the worst
+    frame of each scene. The frames of all drives of a fleet are ranked together, and the worst
+    one opens by default.
     """
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")

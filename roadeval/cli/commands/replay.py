@@ -23,8 +23,8 @@ def replay(
         roadeval replay drive.mcap --truth labels/ --net mine=net.onnx
         roadeval replay drive.mcap --variant robust --save robust.rrd
 
-    Every intermediate goes into a recording for the Rerun viewer. If the log has truth, each stage
-    is scored against it, with the shadow filter and without.
+    Every intermediate result goes into a recording for the Rerun viewer. If the log has truth, each
+    stage is scored against it, with the shadow filter and without.
     """
     config = arguments.configuration(options)
     from roadeval.cli.screens import replay as screen

@@ -23,7 +23,7 @@ def train(
         list[str],
         arguments.argument(
             "DRIVE...",
-            "Camera logs (MCAP), mostly with truth, folders, URLs, or manifests (.toml).",
+            "Camera logs (MCAP), folders, URLs, or manifests (.toml); logs usually have truth.",
         ),
     ],
     *,

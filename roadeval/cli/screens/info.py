@@ -22,13 +22,12 @@ def show(log: LogDescription, out: Console) -> None:
     """Print what a log holds, and what replay would pick from it."""
     size = f"{log.bytes / 1e6:.1f} MB"
     is_partial = not log.verified and not log.by_summary
-    unverified = "; read in part, --verify looks for all damage" if is_partial else ""
+    unverified = "; only a part was read: --verify looks for all damage" if is_partial else ""
     length = f"{(log.end_ns - log.start_ns) / NS:.1f} s from {timestamp(log.start_ns)}"
     console.say(f"{log.path}: {length}, {size}{unverified}", out)
     if read := log.traffic:
-        what = ": the log's summary and first messages" if log.by_summary else ""
-        rest = "; --verify checks every chunk" if log.by_summary else ""
-        console.say(f"read {read}{what}{rest}", out)
+        parts = ": the log's summary and first messages; --verify checks every chunk"
+        console.say(f"read {read}{parts if log.by_summary else ''}", out)
     out.print()
     columns, rows = ["topic", "carries", "size", "messages", "rate"], []
     for topic in log.topics:
@@ -43,8 +42,8 @@ def show(log: LogDescription, out: Console) -> None:
             console.say(f"{topic.name} cannot be read: {with_flags(topic.problem)}", out)
         for before, after in topic.gaps:
             gap = f"gap of {(after - before) / NS:.2f} s"
-            since = f"{(before - log.start_ns) / NS:.2f} s after the start"
-            console.say(f"{topic.name}: {gap}, {since}", out)
+            start = f"{(before - log.start_ns) / NS:.2f} s after the start"
+            console.say(f"{topic.name}: {gap}, {start}", out)
     out.print()
     if log.problem:
         console.say(f"replay would stop: {with_flags(log.problem)}", out)

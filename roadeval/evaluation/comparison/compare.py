@@ -40,11 +40,11 @@ from roadeval.runtime.text import likely
 if TYPE_CHECKING:
     import pandas as pd
 
-FALSE: Final = 0.05
-"""Mean share of the drives marked as changed that may be marked by chance."""
+FALSE_DISCOVERY_RATE: Final = 0.05
+"""Greatest mean share of chance among the drives that are marked as changed."""
 FRAMES: Final = 5_000
 """Evaluated frames of a new result that are in memory together; one drive may have more."""
-_OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
+_LOG_SETTINGS: Final = ("topics.", "labels.", "frames.every", "frames.scale")
 """Settings that change the frames and their truth, and not the method."""
 
 
@@ -55,7 +55,7 @@ class ComparedResult:
     label: str
     drives: int
     scored: int
-    """Number of its drives, and of the scored ones."""
+    """Number of all its drives, and number of its scored drives."""
     drive: str | None
     log_digest: str | None
     """Name and log digest of its only drive; None if there are several, or it is not known."""
@@ -64,7 +64,7 @@ class ComparedResult:
     scale: float | None
     """``frames.scale`` if it is known and the same for all drives."""
     relabelled: int = 0
-    """Number of frames whose truth differs from the base's."""
+    """Number of frames with another truth than in the base."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,10 @@ class MaskChange:
     """Whether it is the variant's final mask."""
     drives: int
     frames: int
-    """Number of drives, and of frames, that both results have."""
+    """Number of drives, and number of frames, that both results have."""
     base: Mapping[str, float]
     new: Mapping[str, float]
-    """Metrics by name: means over drives of the drives' means, with equal weight for each group of
+    """Metrics by name. Rates are means of the drives' means, with equal weight for each group of
     drives; ``pooled_*`` and metrics of the overlap are computed from the summed counts. ``base`` is
     empty if there is no base."""
     difference: Mapping[str, Difference]
@@ -95,7 +95,7 @@ class MaskChange:
 
     @property
     def unchanged(self) -> bool:
-        """Whether no rate changed on any frame."""
+        """Whether all rates are the same on all frames."""
         return bool(self.difference) and all(rate.is_zero for rate in self.difference.values())
 
 
@@ -114,7 +114,7 @@ class DriveChange:
     q: float | None
     """The p-value after Benjamini and Hochberg's correction over all drives."""
     changed: bool
-    """Whether the drive is called changed."""
+    """Whether the drive counts as changed: ``q`` is at most `FALSE_DISCOVERY_RATE`."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class RegionChange:
 
 
 class ClassChange(NamedTuple):
-    """Change of a class's share of a final mask's false road, on all frames of each result."""
+    """Change of a class's share of the false road of a final mask, over all frames of a result."""
 
     result: str
     variant: str
@@ -172,7 +172,7 @@ class Comparison:
     """The classes of the truth, if it has any, by their share of the new result's false road."""
 
     def finals(self) -> list[MaskChange]:
-        """Return the final masks; the baseline's only if there is no other."""
+        """Return the changes of final masks, without the baseline if there is another variant."""
         finals = [change for change in self.changes if change.final]
         return [change for change in finals if change.variant != BASELINE] or finals
 
@@ -182,7 +182,7 @@ def variants_as_sides(
 ) -> list[Side]:
     """Return variants of one result as results to compare, the base first.
 
-    ``variants`` are the names of all its variants, ``chosen`` of those to compare, in order. By
+    ``variants`` are the names of all its variants, ``chosen`` the names to compare, in order. By
     default all but the baseline are compared, ``unfiltered`` first; a single one is compared with
     the baseline. A `RoadevalError` if a variant is missing, or there are fewer than two.
     """
@@ -217,10 +217,10 @@ def compare(
     base, *others = sides
     parts = []
     for new in others:
-        old, (matched, left) = base, pairing.match_drives(base, new)
+        old, (matched, warnings) = base, pairing.match_drives(base, new)
         if across_variants:
             old = replace(base, variants={base.label: new.label})
-            matched, left = [(drive, drive) for drive in base.scored], []
+            matched, warnings = [(drive, drive) for drive in base.scored], []
         if not matched:
             for side in (new, old):
                 if any(drive.digest is None for drive in side.scored):
@@ -231,7 +231,7 @@ def compare(
                 "the scene with the method; compare results of the same drives"
             )
         part = _compare_two(old, new, matched, settings, across_variants=across_variants)
-        parts.append(replace(part, warnings=(*left, *part.warnings)))
+        parts.append(replace(part, warnings=(*warnings, *part.warnings)))
     changes = [*chain(*(part.changes for part in parts))]
     family = [n for n, mask in enumerate(changes) if mask.final and mask.variant != BASELINE]
     corrected = holm([changes[place].difference[TESTED] for place in family])
@@ -282,7 +282,7 @@ def _compare_two(
         frames["base"] += _count_frames(base_rows)
         variants = [values_of(rows, "variant") for rows in (base_rows, new_rows)]
         pairs = _pair_frames(base_rows, new_rows, frames)
-        del base_rows, new_rows  # regions take more memory than all else
+        del base_rows, new_rows  # regions take most memory
         common = {*tables.keys_of(pairs)[0]}
         without_frames += [drive_names[key] for key in new_keys.values() if key not in common]
         if not common:
@@ -296,7 +296,7 @@ def _compare_two(
         parts = pairing.common_regions(finals, new_regions, base.table("regions", new_keys))
         regions.append(by_drive(parts, ["variant", "region"], groups, [TESTED]))
     if not masks:
-        raise _nothing_shared(labels, *variants)
+        raise _no_common_mask(labels, *variants)
     one_camera = len(matched) == 1  # then a number names a frame
     of_masks, of_regions = (None, None) if several else (pairs, parts)
     changed = changed_settings(matched)
@@ -324,7 +324,7 @@ def _compare_two(
     )
 
 
-def _nothing_shared(
+def _no_common_mask(
     labels: tuple[str, str], names: Sequence[str], others: Sequence[str]
 ) -> RoadevalError:
     """Return the error of two results without a common mask; ``names`` are the base's variants."""
@@ -336,7 +336,7 @@ def _nothing_shared(
         )
     return RoadevalError(
         f"{base} has the variants {', '.join(names)}, and {new} {', '.join(others)}",
-        remedy=f"name those to compare, as --variant {names[0]}={others[0]}",
+        remedy=f"name the variants to compare, as --variant {names[0]}={others[0]}",
     )
 
 
@@ -372,7 +372,7 @@ def _compared_result(side: Side, frames: int, relabelled: int = 0) -> ComparedRe
 
 
 def _groups(new: Side, matched: Sequence[Pair]) -> dict[tuple[str, str], str]:
-    """Return the group by drive and camera of ``new``; copies of a log are one group."""
+    """Return the group of each drive and camera of ``new``; copies of a log are one group."""
     firsts = {drive.digest: drive.drive for drive in reversed(new.scored)}
     groups = {drive.key: drive.group or firsts[drive.digest] for drive in new.scored}
     of_base = {drive.key: old.group for old, drive in matched if old.group and not drive.group}
@@ -412,11 +412,12 @@ def by_drive(
     groups: Mapping[tuple[str, str], str],
     rates: Collection[str] = tuple(METRICS),
 ) -> pd.DataFrame:
-    """Sum up each drive's rows of frames, or pairs of them, by the columns ``by``.
+    """Sum up the rows of each drive, a row a frame or a pair of frames, by the columns ``by``.
 
-    Columns are ``frames``, whether all are ``final``, the summed counts, the means of the frames'
-    ``rates``, and ``group``, by drive and camera from ``groups``. Pairs have also the base's counts
-    and rates, which end in ``_base``, and the means of the differences, such as ``change_ERR``.
+    The result has the number of ``frames``, whether all are ``final``, the summed counts, the means
+    of the ``rates``, and the ``group``, which ``groups`` has by drive and camera. For pairs it also
+    has counts and rates of the base, which end in ``_base``, and means of the differences, such as
+    ``change_ERR``.
     """
     import pandas as pd
 
@@ -436,14 +437,14 @@ def by_drive(
 
 
 def _means(drives: pd.DataFrame, names: Sequence[str]) -> list[float]:
-    """Return each column's mean over groups of the groups' means, as differences are averaged."""
+    """Return the mean of the groups' means of each column; differences are averaged alike."""
     return drives.groupby("group")[[*names]].mean().mean().tolist()
 
 
 def _difference(
     drives: pd.DataFrame, rate: str, pairs: pd.DataFrame | None, settings: EvaluationSettings
 ) -> Difference:
-    """Return the difference over drives, or within the only one if its ``pairs`` are given."""
+    """Return the difference over drives, or within the only drive if its ``pairs`` are given."""
     if pairs is not None:
         return within_drive(pairs, rate, settings)
     means = drives.assign(mean=drives[f"change_{rate}"])
@@ -486,7 +487,7 @@ def _mask_changes(
 def _region_changes(
     label: str, drives: pd.DataFrame, pairs: pd.DataFrame | None, settings: EvaluationSettings
 ) -> Iterator[RegionChange]:
-    """Yield the change in each region; the arguments are those of `_mask_changes`."""
+    """Yield the change in each region; the arguments are as in `_mask_changes`."""
     for variant in values_of(drives, "variant"):
         for region, title in titles(values_of(drives, "region")).items():
             rows = only(drives, variant=variant, region=region)
@@ -526,7 +527,7 @@ def _rank_drives(changes: Sequence[DriveChange]) -> Iterator[DriveChange]:
         rows = [change for change in changes if (change.variant, change.stage) == mask]
         values = benjamini_hochberg([row.difference.p for row in rows])
         corrected = (
-            replace(row, q=q, changed=q is not None and q <= FALSE)
+            replace(row, q=q, changed=q is not None and q <= FALSE_DISCOVERY_RATE)
             for row, q in zip(rows, values, strict=True)
         )
         yield from sorted(corrected, key=surest_first)
@@ -550,27 +551,27 @@ def _warnings(
     for label, other, lost in ((base, new, "only base"), (new, base, "only new")):
         if count := frames[lost]:
             yield (
-                f"{count} frames that {label} evaluated are left out against {other}, which "
-                "lacks them or trained on them"
+                f"{count} frames that {label} evaluated are left out, because {other} lacks "
+                "them or trained on them"
             )
-    of_the_log = [
+    differing = [
         Sentence("{} {} and {}", Setting(name), setting(before), setting(after))
         for name, (before, after) in changed.items()
-        if name.startswith(_OF_THE_LOG)
+        if name.startswith(_LOG_SETTINGS)
     ]
-    if of_the_log:
+    if differing:
         yield Sentence(
-            "{} and {} were replayed with different settings ({}): part of the change may be "
-            "theirs",
+            "{} and {} were replayed with different settings ({}), which may cause a part of the "
+            "change",
             base,
             new,
-            Sentence(", ").join(of_the_log),
+            Sentence(", ").join(differing),
         )
     if relabelled := frames["relabelled"]:
-        guess = "" if of_the_log else " (other labels or topics?)"
+        guess = "" if differing else " (other labels or topics?)"
         yield (
-            f"the truth differs on {relabelled} frames between {base} and {new}{guess}: "
-            "part of the change may be the truth's"
+            f"the truth differs on {relabelled} frames between {base} and {new}{guess}, which may "
+            "cause a part of the change"
         )
 
 

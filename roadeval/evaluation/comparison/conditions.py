@@ -67,7 +67,7 @@ class Condition:
     rate: str
     operator: str
     limit: float
-    """In percentage points if ``is_change``, else in percent."""
+    """Number in percentage points if ``is_change``, else in percent."""
     is_change: bool
     surely: bool = False
     """Whether the whole interval of the change must lie beyond the limit."""

@@ -1,7 +1,7 @@
 """Many runs over the same drives: which rate changed in which run.
 
-A run is compared with the runs before it on the drives that both have. A drive whose log, frames or
-truth changed is another drive from then on: its numbers describe other pixels.
+A run is compared with the runs before it on the drives that both have. If a drive's log,
+frames or truth change, it is another drive from then on: its numbers describe other pixels.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Line(NamedTuple):
     title: str
     """The rate and its pixels or drives for people, without the variant."""
     rates: Floats
-    """``(T,)`` mean over the drives of each run; NaN where it has none."""
+    """``(T,)`` mean over the drives of each run; NaN if it has none."""
     levels: Floats
     """``(T,)`` the mean as if every run had the drives of the last run."""
     ends: Floats
@@ -93,8 +93,8 @@ def find_lines(
     ``rows`` has a row for each ``run`` (its position), drive, camera, variant, ``kind`` and
     ``part`` of the pixels: its rates as fractions, the drive's ``group``, ``pixels`` as
     `number_pixels` has them, and the columns of the drives' tags; ``tags`` has the names of the
-    tags by column. All lines are one family, see `roadeval.evaluation.stats.steps`; ``confidence``
-    is that of the intervals around levels.
+    tags by column. All lines are one family, see `roadeval.evaluation.stats.steps`. Intervals
+    around levels have this ``confidence``.
     """
     places = {**group_rows(rows, ["variant", "kind", "part"]).indices}
     for column, tag in tags.items():
@@ -112,7 +112,7 @@ def find_lines(
         drives = part_rows.loc[first, [*KEY, "group"]].astype("str")
         sizes = group_rows(drives.drop_duplicates(), ["group"]).size()
         weights = 1 / drives["group"].map(sizes).to_numpy(float)  # drives of a group share one
-        values = np.full((len(rates), count, len(drives)), np.nan)  # NaN where a run lacks a drive
+        values = np.full((len(rates), count, len(drives)), np.nan)  # NaN if a run lacks a drive
         values[:, part_rows["run"], column] = part_rows[[*rates]].to_numpy().T
         name = {ALL: "", "region": regions.get(part, ""), "class": part}.get(kind, f"{kind} {part}")
         for rate, drive_rates in zip(rates, values, strict=True):
@@ -190,7 +190,7 @@ def find_changes(lines: Sequence[Line], confidence: float, within: Within) -> li
     for line in lines:
         for step in line.steps:
             last = step.run if step.kind == "outlier" else step.after
-            # The end of a drift, whose beginning is like the level before.
+            # The end of a drift; its beginning is like the level before.
             first = last - (last - step.run) // 4 if step.kind == "drift" else step.run
             runs = range(step.before, step.run), range(first, last + 1)
             changes.append(LineChange(line, step, *_difference(line, *runs, confidence, within)))

@@ -162,7 +162,7 @@ def common_masks(base: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
 
 
 def truth_differs(base: pd.DataFrame, new: pd.DataFrame) -> int:
-    """Return the number of frames whose truth differs, from two results' rows of ``frames``."""
+    """Return the number of frames with different truths, from two results' rows of ``frames``."""
     base, new = (table[~table.duplicated([*KEY, "frame"])] for table in (base, new))
     truths = pair_rows(base, new, [*KEY, "stamp_ns"])[["truth", "truth_base"]]
     return int((truths.ne(0).all(axis=1) & truths["truth"].ne(truths["truth_base"])).sum())
@@ -212,7 +212,7 @@ def common_regions(pairs: pd.DataFrame, new: pd.DataFrame, base: pd.DataFrame) -
 
 @dataclass(frozen=True)
 class MovedFrame:
-    """A frame whose final ERR changed much from the base to the new result."""
+    """A frame with a great change of the final ERR from the base to the new result."""
 
     result: str
     variant: str
@@ -237,7 +237,7 @@ class Disagreement:
 
 
 def moved_frames(result: str, pairs: pd.DataFrame) -> Iterator[MovedFrame]:
-    """Yield the frames whose ERR changed most, of the first final mask."""
+    """Yield the frames on which the ERR of the first final mask changed most."""
     pairs = next((rows for _, rows in group_rows(only(pairs, final=True), MASK)), pairs)
     base = pairs[f"{TESTED}_base"]
     pairs = pairs.assign(before=base, change=pairs[TESTED] - base)

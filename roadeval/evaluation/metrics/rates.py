@@ -58,7 +58,7 @@ METRICS: Final = (
         rank=3,
         meaning="road not found",
     ),
-    Metric(  # Eq. 28; undefined where everything is road, as is Eq. 29
+    Metric(  # Eq. 28; undefined if everything is road, like Eq. 29
         name="TNR",
         title="true negative rate",
         formula="TN / (TN + FP)",

@@ -1,4 +1,4 @@
-"""The regions: sets of pixels that are counted apart, to show where the errors are.
+"""The regions: sets of pixels that are counted separately, to show where the errors are.
 
 To add regions, add a file with ``REGIONS``; ``regions.csv`` and the report then have their rows.
 Another package adds one by an entry point of the group ``roadeval.regions``.
@@ -46,7 +46,7 @@ def of_frame(labelled: LabelledFrame) -> dict[str, Bits]:
 def titles(names: Collection[str], height: int = 0) -> dict[str, str]:
     """Return the titles of some regions for people, in order.
 
-    The title of a region that no file defines is its name. ``height`` is the height of the images
+    A region that no file defines has its name as its title. ``height`` is the height of the images
     in pixels, or 0 if it is not known.
     """
     defined = {n: title for r in regions() for n, title in r.titles_of(names, height).items()}

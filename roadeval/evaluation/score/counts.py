@@ -90,7 +90,7 @@ class EdgesAndFlicker:
     """Sums up boundary F, boundary IoU, trimap and flicker of every final mask.
 
     ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
-    ``L_t`` are the pixels that both truths label. ``truth_flicker`` is that of the truth: moving
+    ``L_t`` are the pixels that both truths label. ``truth_flicker`` is the truth's flicker: moving
     objects must change, so only what exceeds it is flicker. Motion is not removed by optical flow,
     as it is in [1]_. ``width`` is the tolerance of boundary F in pixels.
 
@@ -134,7 +134,7 @@ class EdgesAndFlicker:
         """Return the means and sums by variant; None if undefined.
 
         ``boundary_F`` and ``boundary_IoU`` are means over the frames that have them, ``trimap`` has
-        the pixels of all frames. The baseline, whose mask is always the same, has no flicker.
+        the pixels of all frames. The baseline has no flicker, because its mask is always the same.
         """
         totals = {}
         for name, sums in self._sums.items():

@@ -34,13 +34,13 @@ class Degradation:
 
 
 Degradations = dict[str, dict[str, Degradation]]
-"""By variant, and by the disturbance's name, such as ``fog-2``."""
+"""Degradations by variant, and by the disturbance's name, such as ``fog-2``."""
 
 
 def degradations(
     disturbed: pd.DataFrame, frames: pd.DataFrame, settings: EvaluationSettings
 ) -> Degradations:
-    """Compare final masks of disturbed frames with those of the table ``frames`` of a drive.
+    """Compare final masks of disturbed frames with the masks in the table ``frames`` of a drive.
 
     ``disturbed`` has their counts by ``disturbance``, such as ``fog:2``. With several cameras, ERR
     is the mean of the cameras' means.

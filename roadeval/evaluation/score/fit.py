@@ -216,11 +216,11 @@ class FitCheck:
         self._fits = defaultdict[Finding, dict[int, Floats]](dict)
         """Fits by change and by frame of a spot; a lag of 0 is no change."""
         self._moves = defaultdict[str, list[tuple[Floats, Floats]]](list)
-        """By subject, for each spot: the fit at each of `_MOVES`, and, without a move, the
-        agreement with the image at each of `_GROWTHS`."""
+        """The fit at each of `_MOVES`, and without a move the agreement with the image at each of
+        `_GROWTHS`, for each spot by subject."""
         self._upside = defaultdict[str, list[float]](list)
-        """By subject, for each spot: the share of road in the upper quarter minus the share before
-        the vehicle, -1 to 1."""
+        """The share of road in the upper quarter minus the share before the vehicle, -1 to 1, for
+        each spot by subject."""
         self._roads: list[Plane] = []
         """Road of the truth at each spot."""
 

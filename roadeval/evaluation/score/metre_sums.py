@@ -47,7 +47,7 @@ class MetreSums:
         self._measures: Sequence[tuple[str, int]] = ()
         self._regions: Sequence[str] = ()
         self._differences = defaultdict[tuple[str, int], Counter[int]](Counter)
-        """By variant and place in ``(S, M)``: how often each difference occurs, in centimetres."""
+        """How often each difference in centimetres occurs, by variant and place in ``(S, M)``."""
         self._seen: dict[str, Sums] = {}
         """``(M,)`` by variant: number of frames on which the truth has the measure."""
         self._rates: dict[str, Floats] = {}

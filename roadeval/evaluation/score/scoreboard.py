@@ -135,7 +135,7 @@ class CountedRows:
         self._names: Final = names
         """Columns that name a mask, such as variant and stage."""
         self._rows: Final = array("I")
-        """For each row the place of the frame, the place of the names, and the four counts."""
+        """The place of the frame, the place of the names, and the four counts of each row."""
         self._places: Final[dict[tuple[str, ...], int]] = {}
 
     def add(self, place: int, counts: Iterable[tuple[tuple[str, ...], data.Counts]]) -> None:
@@ -325,7 +325,7 @@ class Scoreboard:
     def thresholds(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the evaluated frames' ERR at the threshold that is best on the training frames.
 
-        That tells little about a method that learnt from those. See `Curves.at_best_of`.
+        This tells little about a method that learnt from these frames. See `Curves.at_best_of`.
         """
         return self.curves.at_best_of(self._training)
 

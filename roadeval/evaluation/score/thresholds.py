@@ -25,7 +25,7 @@ import numpy as np
 
 from roadeval.data import CERTAIN, CODES, Histogram, as_tree, best_code, wrong_above
 from roadeval.data.arrays import FN, FP, IGNORED, Floats, Plane, Sums
-from roadeval.data.result import Cells
+from roadeval.data.result import AnyArray
 from roadeval.evaluation.score.counts import Name
 
 LEVELS: Final = 256
@@ -51,7 +51,7 @@ class Thresholds(NamedTuple):
     """Numbers of all road and of all non-road pixels."""
 
     @classmethod
-    def of(cls, counts: Cells) -> Thresholds:
+    def of(cls, counts: AnyArray) -> Thresholds:
         """Return the thresholds from ``(2, n)`` counts of non-road and road by code or level."""
         codes = np.flatnonzero(counts.any(axis=0))[::-1]
         fp, tp = counts[:, codes].astype(np.int64).cumsum(axis=1)
@@ -102,9 +102,9 @@ def calibration(counts: Sums) -> dict[str, float]:
     share of pixels that are right at a threshold of one half.
     """
     pixels, p = counts.sum(axis=0), np.arange(CODES) / CERTAIN
-    road, stated = (codes.reshape(LEVELS, -1).sum(axis=1) for codes in (counts[1], pixels * p))
+    road, expected = (codes.reshape(LEVELS, -1).sum(axis=1) for codes in (counts[1], pixels * p))
     sums = {
-        "ECE": np.abs(road - stated).sum(),
+        "ECE": np.abs(road - expected).sum(),
         "confidence": (pixels * np.maximum(p, 1 - p)).sum(),
         "right": pixels.sum() - wrong_above(counts)[round(CERTAIN / 2)],
     }
@@ -151,15 +151,15 @@ class Curves:
 
 
 CELLS: Final = 160
-"""Cells across the longer side of a heat map, at most."""
+"""Greatest number of cells along the longer side of a heat map."""
 PENDING: Final = 255
-"""Number of frames whose sum fits in bytes, which are added ten times as fast as integers."""
+"""Number of frames that are summed up in bytes, which takes a tenth of the time of integers."""
 
 
 class HeatMap:
-    """Counts of how often each pixel was labelled, a false positive and a false negative.
+    """The numbers of frames on which each pixel was labelled, a false positive, a false negative.
 
-    They are summed up in square cells of at least 8 pixels a side, `CELLS` across at most: a sum
+    They are summed up in square cells of at least 8 pixels a side, at most `CELLS` across: a sum
     per pixel takes much memory and disk. Frames of another size than the first are left out.
     """
 

@@ -10,7 +10,7 @@ dominated by unlikely models with huge errors, which would hide any finding. Ske
 distribution [2]_: a drive that met few bursts has a mean that is too low *and* a spread that is too
 small.
 
-``benchmarks/INTERVALS.md`` compares how often these intervals and those of textbooks hold. They do
+``benchmarks/INTERVALS.md`` compares how often these and textbooks' intervals hold. They do
 not allow for drift that noise hides on a short drive, for drift that takes longer than the drive,
 or for bursts that are rare on a drive. In these cases three or four of five intervals hold instead
 of nineteen of twenty, and p-values are too small.
@@ -42,7 +42,7 @@ _SHARES: Final = (1, 0.95, 0.75, 0.5, 0.25)
 class MeanDistribution(NamedTuple):
     """Student's distribution of a mean, skewed, given a series.
 
-    An interval holds the values whose p-value is at least one minus the confidence.
+    An interval holds the values with a p-value of at least one minus the confidence.
     """
 
     mean: float
@@ -65,7 +65,7 @@ class MeanDistribution(NamedTuple):
         return float(2 * stdtr(self.degrees, -abs(symmetric)))
 
     def interval(self, confidence: float) -> tuple[float, float]:
-        """Return the lowest and the highest value whose p-value is ``1 - confidence``."""
+        """Return the lowest and the highest value with the p-value ``1 - confidence``."""
         from scipy.special import stdtrit
 
         t, s = float(stdtrit(self.degrees, (1 + confidence) / 2)), self.skewness

@@ -47,7 +47,7 @@ class Difference:
     """A mean of paired differences, new minus base, with its interval. Fractions."""
 
     mean: Annotated[float, BeforeValidator(lambda read: math.nan if read is None else read)]
-    """NaN if no unit has a difference; null where it is read from JSON."""
+    """NaN if no unit has a difference; null in JSON."""
     low: float | None
     high: float | None
     """The interval; within a drive it stays in the range that the base's rate allows. None together
@@ -66,7 +66,7 @@ class Difference:
     """The mean's standard error; None if `effective` is."""
     degrees: float | None = None
     """Degrees of freedom. Apart from skewness and the limits of the base's rate, the interval is
-    ``mean ± t(degrees) standard_error``, and the p-value that of ``mean / standard_error``."""
+    ``mean ± t(degrees) standard_error``, and the p-value belongs to ``mean / standard_error``."""
     groups: int | None = None
     """Number of groups of drives, which have equal weights; None within a drive."""
     worse: int | None = None
@@ -192,8 +192,8 @@ def at_moments(cameras: Sequence[tuple[Sums, Floats]]) -> Floats:
 
     ``cameras`` have stamps and differences, ``(n,)`` each. Values are scaled to vary as their mean
     does: at moment t of T the value is ``mean + T sum_i (d_i - mean_c) / (C n_c)`` over the frames
-    i of that moment, where camera c of C took frame i and has n_c frames. The moments are those of
-    the camera with most frames; a frame of another camera belongs to the nearest moment.
+    i of that moment, where camera c of C took frame i and has n_c frames. The camera with
+    most frames sets the moments; a frame of another camera belongs to the nearest moment.
     """
     clock = max((stamps for stamps, _ in cameras), key=len)
     order, start = np.argsort(clock, kind="stable"), clock.min()
@@ -283,7 +283,7 @@ def sign_flip_p(values: Floats, mean: float = 0.0) -> float:
 
 
 def sign_flip_interval(values: Floats, confidence: float) -> tuple[float, float]:
-    """Compute the least and the greatest mean whose p-value is at least ``1 - confidence`` [1]_."""
+    """Compute the least and greatest mean with a p-value of at least ``1 - confidence`` [1]_."""
     return _lower_end(values, confidence), -_lower_end(-values, confidence)
 
 
@@ -325,7 +325,7 @@ def holm(family: Sequence[Difference]) -> list[Difference]:
 def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
     """Correct p-values so that few findings are false.
 
-    Among the findings whose corrected value is at most ``q``, a share of at most ``q`` is false on
+    A share of at most ``q`` of the findings with a corrected value of at most ``q`` is false on
     average: ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [4]_. That holds if the
     tests are independent, as tests of different drives are, or depend on each other positively.
     None stands for a finding that was not tested: it is not counted and stays None.

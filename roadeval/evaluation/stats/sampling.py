@@ -77,9 +77,9 @@ def estimate(
 ) -> Estimate:
     """Estimate the mean of a rate over all frames.
 
-    The mean of the drawn frames is corrected for the distance of their mean score from that of all
-    frames (a regression estimator [1]_, section 7); its variance is that of the residuals, each
-    divided by one minus its leverage, as in the jackknife. The draw is stratified along the drive,
+    The mean of the drawn frames is corrected for the distance of their mean score from the mean
+    score of all frames (a regression estimator [1]_, section 7). Its variance comes from the
+    residuals, each divided by one minus its leverage (jackknife). The draw is stratified in time,
     so the variance is computed from the differences of neighbours among the drawn frames ([2]_,
     section 8.2, v2). Their gaps are less even if many frames are drawn, so the variance of a simple
     random sample is added, times the share that is drawn. With fewer than `REGRESSION_FROM` labels

@@ -6,7 +6,7 @@ are tested on the other half. A block is long enough to be nearly independent of
 errors change slowly, a drive has only two blocks.
 
 A drive's frames resemble each other, and so do their conditions. The difference of ERR inside and
-outside is a weighted sum of the frames' ERR, whose variance `mean_distribution` computes for these
+outside is a weighted sum of the frames' ERR. `mean_distribution` computes its variance for these
 weights; pixels of one frame are compared as pairs. Errors are modelled with half of the difference:
 with all of it, a real difference looks like slow errors; without it, slow errors look less slow. In
 a part of the image under a condition, ERR must also be higher than in the part without the
@@ -333,7 +333,7 @@ class _Search:
 def _within_drives(wrong: Floats, rest: Floats, labelled: Floats, rest_labelled: Floats) -> Floats:
     """Return sides by drive, weighted.
 
-    The weights are those of Mantel and Haenszel, so that each drive is compared with itself. If no
+    The weights are Mantel and Haenszel's, so that each drive is compared with itself. If no
     drive has pixels both inside and outside, for example with a tag, drives are compared with each
     other, without weights.
     """

@@ -17,7 +17,7 @@ LEAST_NOISE: Final = 1e-6  # of a rate; less is rounding
 
 
 class ChangePoint(NamedTuple):
-    """A change of the level. Positions are those of runs."""
+    """A change of the level. Positions are numbers of runs."""
 
     kind: str  # "step", "drift" or "outlier"
     before: int  # the first run of the old level
@@ -38,7 +38,7 @@ class Trace(NamedTuple):
 def trace(values: Floats, weights: Floats, family: int = 1) -> Trace:
     """Find the steps, drifts and outliers of a rate over runs.
 
-    ``values`` are the mean rates of drives in runs, ``(T, D)``, NaN where a run lacks a drive;
+    ``values`` are the mean rates of drives in runs, ``(T, D)``, NaN if a run lacks a drive;
     ``weights``, ``(D,)``, say how much a drive counts; ``family`` series are searched together.
 
     A run detects a step if two levels fit better than one by h = ``8 / 3 log(365 family / 0.05)``
@@ -132,7 +132,7 @@ def _alarm(level: Floats, width: Floats, noises: Floats, limit: float) -> tuple[
 def _fit(level: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the loss of runs up to i at run j's level, its least for i, and the gain of a step.
 
-    The loss is -2 log-likelihood. The gain at run i is that of the best place for a step.
+    The loss is -2 log-likelihood. The gain at run i is the gain of a step at the best place.
     """
     losses = 4 * np.log1p(((level[:, None] - level) / noise[:, None]) ** 2 / 3).cumsum(axis=0)
     later = ~np.tri(len(level), dtype=bool)

@@ -86,7 +86,7 @@ def audit(
     labels
         Format of the labels that are written for correction: ``png`` or ``coco``.
     annotators
-        The variants whose masks are another person's labels.
+        The variants with another person's labels as masks.
 
     Raises
     ------

@@ -37,7 +37,7 @@ MOVED: Final = 2
 most."""
 ERRORS_SHOWN: Final = 6
 LAYERS: Final = 2
-"""On paper a frame shows the errors, and all layers, of so many variants."""
+"""Numbers of variants that paper shows of a frame: with their errors, and with all layers."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:

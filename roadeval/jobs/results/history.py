@@ -117,7 +117,7 @@ def history(
         A label (see ``--label``): results that share its value are one run. By default each is a
         run. Runs are in the order in which they were made.
     last
-        Number of runs before the last one whose mean ``fail_if`` compares it with.
+        Number of runs before the last one; ``fail_if`` compares it with their mean.
     fail_if
         Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
     """

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data.arrays import Plane
-from roadeval.data.result import Cells
+from roadeval.data.result import AnyArray
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
 from roadeval.evaluation.comparison.pairing import ComparedDrive
@@ -61,7 +61,7 @@ NO_NUMBER: Final = ("output", "run", "fleet", "labels.names", "frames.disturb")
 """Tables of a run's settings that change no number."""
 
 
-def _if_there(read: Callable[..., Cells], *address: Any) -> Cells | None:
+def _if_there(read: Callable[..., AnyArray], *address: Any) -> AnyArray | None:
     """Read a picture of a recording; None if it has none there."""
     try:
         return read(*address)
@@ -267,7 +267,7 @@ class DriveResult:
         assert self.recording is not None
         return _if_there(self.recording.truth, frame)
 
-    def final_masks(self, frame: int) -> dict[str, Cells]:
+    def final_masks(self, frame: int) -> dict[str, AnyArray]:
         """Return the final masks of a frame that the run kept, by their variants."""
         assert self.recording is not None
         layers = (

@@ -81,7 +81,7 @@ def replay_fleet(
     output
         The fleet's folder, which the workers must see under the same path.
     config
-        Every option, those of the fleet included (`RunConfig.fleet`).
+        Every option, with the options of the fleet (`RunConfig.fleet`).
     executor
         Runs the replays; by default Dask's workers, as `RunConfig.fleet` says.
     on_progress

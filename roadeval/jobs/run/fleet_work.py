@@ -27,7 +27,7 @@ from roadeval.fleet.drives import DriveEntry, FleetError
 from roadeval.fleet.remote import stamp
 from roadeval.jobs.run.prepared import settings_digest, software
 from roadeval.jobs.run.replay import replay
-from roadeval.jobs.run.train import draw
+from roadeval.jobs.run.train import training_frames
 from roadeval.logs.truth.meaning import label_files
 from roadeval.recording.layout import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
@@ -178,7 +178,7 @@ def stamp_files(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
 
 
 def _check_software(asking: Mapping[str, str], config: RunConfig) -> None:
-    """Raise a FleetError if a worker's software is not that of the command."""
+    """Raise a FleetError if a worker has other software than the command."""
     installed = software(config)
     for name in sorted(asking.keys() | installed.keys()):
         mine, theirs = installed.get(name, "none"), asking.get(name, "none")
@@ -216,7 +216,7 @@ def _try_replay(task: DriveTask) -> Made:
         if _disk_failure(error):
             raise
         is_known = isinstance(error, RoadevalError) or memory.is_lacking(error)
-        reason = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
+        reason = memory.NOT_ENOUGH if memory.is_lacking(error) else " ".join(str(error).split())
         if not is_known:
             reason = f"{type(error).__name__}: {reason} (a defect of roadeval)"
         return mark_failed(task, reason, 1 if is_known else 70)
@@ -326,7 +326,7 @@ def _train_model(task: FoldTask, facts_file: Path, asked_digest: str) -> tuple[s
         if len(drawn) == TRAINING_DRIVES:
             break
         try:
-            frames, _ = draw(entry, config, held, labelled=True)
+            frames, _ = training_frames(entry, config, held, labelled=True)
         except RoadevalError as error:
             if _disk_failure(error):
                 raise

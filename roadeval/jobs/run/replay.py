@@ -84,7 +84,7 @@ def replay(
         An MCAP file, a rosbag2 folder of split files, or the URL of an MCAP file; only the parts of
         it that are needed are read.
     config
-        Every option; by default those of ``roadeval replay``. See `roadeval.configure` and
+        Every option, by default as ``roadeval replay`` has it. See `roadeval.configure` and
         `roadeval.load_config`.
     save, reports, mcap
         Paths of the recording, of the folder of tables and figures, and of the log of masks, in

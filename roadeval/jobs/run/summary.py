@@ -56,11 +56,11 @@ OF_ONE_CAMERA: Final = ("beyond", "curves", "thresholds", "slices", "oracles", "
 
 
 def make_facts(
-    run: Run, sums: DriveSums, examples: list[int], stated: dict[str, TableFacts]
+    run: Run, sums: DriveSums, examples: list[int], table_facts: dict[str, TableFacts]
 ) -> Facts:
     """Return the facts of a run at its end, with the frames of figure 2.
 
-    ``stated`` are rows and checksums of the tables.
+    ``table_facts`` are rows and checksums of the tables.
     """
     settings, selection, doubts = run.config.training, run.selection, run.board.unlabelled
     is_given = settings.model is not None and not settings.adapt
@@ -100,7 +100,7 @@ def make_facts(
         versions=versions(),
         log=LogFacts(run.log.source, run.log.digest),
         masks=_mask_facts(run),
-        tables=stated,
+        tables=table_facts,
     )
     return replace(facts, verdict=verdict_on(facts))
 
@@ -206,7 +206,7 @@ def join_cameras(
     frames: pd.DataFrame,
     disturbed: pd.DataFrame,
     cameras: Mapping[str, Facts],
-    stated: dict[str, TableFacts],
+    table_facts: dict[str, TableFacts],
 ) -> Facts:
     """Return the facts of a rig, in which every camera counts the same."""
     first, *_ = cameras.values()
@@ -234,7 +234,7 @@ def join_cameras(
         losses=[*_name_cameras({name: facts.losses for name, facts in cameras.items()})],
         disturbances=degradations(disturbed, frames, first.evaluation),
         training=TrainingFacts(first.training.source, model=first.training.model),
-        tables=stated,
+        tables=table_facts,
         cameras={**cameras},
         examples=[],
         **empty,

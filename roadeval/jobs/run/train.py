@@ -26,12 +26,12 @@ def train(
     *,
     on_progress: OnProgress = ignore,
 ) -> Model:
-    """Train every variant on one drive or some, and write the model file.
+    """Train every variant on one or more drives, and write the model file.
 
     ``drives`` are named as for `roadeval.replay_fleet`. From each drive ``training.frames``
     labelled frames are used, spread evenly over the selected range. Frames without truth are used
-    if ``training.source`` is ``patch``, or if it is ``auto`` and no drive has truth. The label
-    settings are for every drive without its own in a manifest. Frames that cannot be decoded are
+    if ``training.source`` is ``patch``, or if it is ``auto`` and no drive has truth. The settings
+    of labels hold for every drive without own ones in a manifest. Frames that cannot be decoded are
     left out, and listed in `Model.losses`. A `RoadevalError` if only some drives have truth, or
     there is nothing to learn.
     """
@@ -44,7 +44,7 @@ def train(
         for entry in entries:
             path = Path(f"{entry.shown} {entry.camera}".rstrip())
             name = path.name if len(entries) > 1 else ""
-            frames[path], lost = draw(entry, entry.config(config), held, name=name)
+            frames[path], lost = training_frames(entry, entry.config(config), held, name=name)
             losses += lost
         model = learning.from_drives(frames, config.pipelines(), settings)
         model = replace(model, losses=tuple(losses))
@@ -52,7 +52,7 @@ def train(
         return model
 
 
-def draw(
+def training_frames(
     drive: DriveEntry,
     config: RunConfig,
     held: HeldFrames,
@@ -60,10 +60,10 @@ def draw(
     labelled: bool = False,
     name: str = "",
 ) -> tuple[list[Frame], list[str]]:
-    """Decode the training frames of a drive and hold them; return also its losses.
+    """Return the training frames of a drive, added to the ``held`` ones, and sentences on losses.
 
-    If they must be ``labelled``, a drive without road truth gives none. Sentences on losses begin
-    with the ``name``, if there is one.
+    If they must be ``labelled``, a drive without road truth gives none. The sentences begin with
+    the ``name``, if there is one.
     """
     frames, streams = list[Frame](), list[FrameStream]()
     with open_log(open_source(drive.source, config.run.patience_s), config.for_training()) as log:

@@ -1,6 +1,6 @@
 """The MCAP container: records, chunks, damage and recovery.
 
-The record classes are those of the `mcap` library. The walk through a file is our own because no
+The record classes are the `mcap` library's. The walk through a file is our own because no
 package recovers damaged MCAP files: the library stops at the first invalid record, and cannot read
 a log after its recorder was killed, with damaged chunks, or with a missing or wrong summary.
 

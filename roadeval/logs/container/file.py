@@ -35,7 +35,7 @@ OUTSIDE: Final = -1
 BEFORE_ALL: Final = int(np.iinfo(np.int64).min) + 1
 """A log time before all others."""
 
-Wanted = Callable[[Channel, Schema | None], bool]
+ChannelTest = Callable[[Channel, Schema | None], bool]
 """Whether the messages of a channel, with its schema, will be read."""
 
 
@@ -43,7 +43,7 @@ Wanted = Callable[[Channel, Schema | None], bool]
 class ChannelLog:
     """The places of the messages of one channel."""
 
-    wanted: bool
+    is_wanted: bool
     count: int = 0
     first_ns: int = np.iinfo(np.int64).max
     last_ns: int = np.iinfo(np.int64).min
@@ -58,12 +58,12 @@ class ChannelLog:
             self.count += len(entries)
             self.first_ns = min(self.first_ns, int(entries[:, 0].min()))
             self.last_ns = max(self.last_ns, int(entries[:, 0].max()))
-            if self.wanted:
+            if self.is_wanted:
                 self.blocks.append((chunk, entries))
 
 
 def containers_in(
-    path: Path, wanted: Wanted, stamp_of: StampOf, *, opened: IO[bytes] | None = None
+    path: Path, is_wanted: ChannelTest, stamp_of: StampOf, *, opened: IO[bytes] | None = None
 ) -> Iterator[Container]:
     """Open the log in a file, and the logs that follow it in the same file.
 
@@ -74,15 +74,15 @@ def containers_in(
         scan = Scan(rest, stamp_of)
         if scan.next_log is not None:
             scan = Scan(rest.part(0, scan.next_log), stamp_of)
-        yield Container(path, scan, wanted)
+        yield Container(path, scan, is_wanted)
         rest = rest.part(len(scan.source), len(rest))
 
 
 class Container:
-    """One MCAP log, damaged or not; ``wanted`` says which messages will be read."""
+    """One MCAP log, damaged or not; ``is_wanted`` says which messages will be read."""
 
-    def __init__(self, path: Path, scan: Scan, wanted: Wanted) -> None:
-        self.path, self.scan, self._wanted = path, scan, wanted
+    def __init__(self, path: Path, scan: Scan, is_wanted: ChannelTest) -> None:
+        self.path, self.scan, self._is_wanted = path, scan, is_wanted
         self.source, self.reader, self.chunks = scan.source, scan.reader, scan.chunks
         self.schemas, self.channels = scan.schemas, scan.channels
         self.data_is_right: bool | None = None
@@ -204,7 +204,8 @@ class Container:
             for channel_id, entries in index.items():
                 if channel_id not in logs:
                     channel, schema = self._described(channel_id)
-                    logs[channel_id] = ChannelLog(bool(channel and self._wanted(channel, schema)))
+                    is_wanted = bool(channel and self._is_wanted(channel, schema))
+                    logs[channel_id] = ChannelLog(is_wanted)
                 logs[channel_id].add(number, entries)
         return logs
 
@@ -263,7 +264,7 @@ class Container:
             channel, schema = self._described(channel_id)
             if channel is None or record not in (channel, schema):
                 continue
-            for chunk, entries in log.blocks[:5] if self._wanted(channel, schema) else ():
+            for chunk, entries in log.blocks[:5] if self._is_wanted(channel, schema) else ():
                 log_time, offset = entries[0].tolist()
                 with suppress(BadRecord):
                     stamp = self.scan.stamp_of(channel, schema, self.message(chunk, offset))
@@ -328,7 +329,7 @@ def damage_of(container: Container) -> tuple[Damage, ...]:
 
 
 def sure_until(container: Container) -> int | None:
-    """Return the log time up to which the positions of messages are those of the recording.
+    """Return the log time up to which messages have the same positions as when they were recorded.
 
     They shift after a loss of an unknown number of messages. None if all positions are certain; a
     time before all others if the damage may lie anywhere.

@@ -11,7 +11,7 @@ from typing import IO, Final
 
 import numpy as np
 
-from roadeval.logs.container.file import ChannelLog, Container, Wanted
+from roadeval.logs.container.file import ChannelLog, ChannelTest, Container
 from roadeval.logs.container.records import (
     IN_MEMORY,
     MESSAGE_INDEX,
@@ -28,13 +28,13 @@ from roadeval.logs.container.scan import Scan, StampOf
 from roadeval.logs.errors import BadRecord
 
 BEGINNING: Final = 192 << 10
-"""Uncompressed bytes of a chunk that are read at least: the first few frames and labels."""
+"""Least number of uncompressed bytes of a chunk to read: they hold a few frames and labels."""
 COMPRESSED_BLOCK: Final = 128 << 10
-"""Bytes that Zstandard needs at most before it gives the first one of a block."""
-ENDS: Final = 4
-"""Chunks whose indexes are read only for the times of first and last messages."""
-FEW: Final = 100
-"""Greatest number of messages to read where one is not enough, such as static transforms."""
+"""Greatest number of bytes that Zstandard needs before it returns the first byte of a block."""
+INDEXES: Final = 4
+"""Greatest number of chunks with indexes that are read only for the times of messages."""
+MANY: Final = 100
+"""Greatest number of messages to read if one is not enough, as of static transforms."""
 
 
 class SummaryScan(Scan):
@@ -44,15 +44,15 @@ class SummaryScan(Scan):
     """
 
     def __init__(
-        self, source: FileBytes, stamp_of: StampOf, wanted: Wanted, several: Wanted
+        self, source: FileBytes, stamp_of: StampOf, is_wanted: ChannelTest, needs_many: ChannelTest
     ) -> None:
-        self._wanted, self._several = wanted, several
+        self._is_wanted, self._needs_many = is_wanted, needs_many
         self.totals: dict[int, ChannelLog] = {}
         """Number and times of the messages of the whole log, by channel."""
         super().__init__(source, stamp_of)
 
     def _walk(self) -> None:
-        summary, self.summary = self.summary, Summary()  # what is read is not compared with it
+        summary, self.summary = self.summary, Summary()  # reading does not compare with it
         counts, firsts, lasts = _ends_of_channels(summary)
         needed: dict[int, set[int]] = {}
         for number, chunk in firsts.items():
@@ -60,10 +60,10 @@ class SummaryScan(Scan):
             schema = self.schemas.get(channel.schema_id) if channel else None
             if channel is None or (schema is None and channel.schema_id):
                 raise BadRecord("a channel that the summary does not describe")
-            if self._wanted(channel, schema):
+            if self._is_wanted(channel, schema):
                 needed.setdefault(chunk.offset, set()).add(number)
         ends = Counter(chunk.offset for chunk in (*firsts.values(), *lasts.values()))
-        others = [offset for offset, _ in ends.most_common() if offset not in needed][:ENDS]
+        others = [offset for offset, _ in ends.most_common() if offset not in needed][:INDEXES]
         indexes = {
             offset: self._index_of(summary.chunks[offset], summary.index_ends[offset])
             for offset in (*needed, *others)
@@ -82,9 +82,9 @@ class SummaryScan(Scan):
             self._take_beginning(summary.chunks[offset], indexes[offset], channels)
 
     def _index_of(self, chunk: Chunk, end: int) -> dict[int, Entries]:
-        """Read the message indexes of a chunk, which end at a byte."""
+        """Return the entries of a chunk's message indexes, which end at ``end``, by channel."""
         if end - chunk.data_end > IN_MEMORY:
-            raise BadRecord("a message index of a length that cannot be")
+            raise BadRecord("a message index of an impossible length")
         data = memoryview(self.source[chunk.data_end : end])
         indexes = dict[int, Entries]()
         for opcode, _, body, after, _ in walk(data):
@@ -101,15 +101,15 @@ class SummaryScan(Scan):
     def _take_beginning(
         self, listed: Chunk, index: Mapping[int, Entries], channels: Set[int]
     ) -> None:
-        """Read a chunk up to the first messages of some channels; the whole if that fails."""
+        """Read a chunk up to the first messages of some channels, or all of it if that fails."""
         if not channels <= index.keys():
             raise BadRecord("a message index that the summary lists is not there")
         starts = np.sort(np.concatenate([entries[:, 1] for entries in index.values()]))
         size = min(BEGINNING, listed.size)
         for number in channels:
             channel = self.channels[number]
-            needs_several = self._several(channel, self.schemas.get(channel.schema_id))
-            last = np.sort(index[number][:, 1])[:FEW][-1 if needs_several else 0]
+            takes_many = self._needs_many(channel, self.schemas.get(channel.schema_id))
+            last = np.sort(index[number][:, 1])[:MANY][-1 if takes_many else 0]
             following = starts[np.searchsorted(starts, last, side="right") :]
             size = max(size, int(following[0]) if len(following) else listed.size)
         if listed.compression:
@@ -159,16 +159,16 @@ def _ends_of_channels(
 
 
 def outline_of(
-    path: Path, file: IO[bytes], wanted: Wanted, several: Wanted, stamp_of: StampOf
+    path: Path, file: IO[bytes], is_wanted: ChannelTest, needs_many: ChannelTest, stamp_of: StampOf
 ) -> Container | None:
     """Open a log by its summary; None if that is missing, damaged, or incomplete.
 
-    The ``wanted`` channels have only their first messages, or as many as their first chunk holds if
-    they need ``several``. Damage of other parts is not noticed.
+    Each channel that ``is_wanted`` has only its first message, or up to `MANY` messages of its
+    first chunk if it ``needs_many``. Damage of other parts is not noticed.
     """
     with suppress(BadRecord):
-        outline = SummaryScan(FileBytes(file), stamp_of, wanted, several)
-        container = Container(path, outline, wanted)
+        outline = SummaryScan(FileBytes(file), stamp_of, is_wanted, needs_many)
+        container = Container(path, outline, is_wanted)
         for channel_id, total in outline.totals.items():
             read = container.logs.get(channel_id)
             container.logs[channel_id] = replace(total, blocks=read.blocks if read else [])

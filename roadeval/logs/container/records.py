@@ -1,8 +1,8 @@
 """Bytes by position, the records of an MCAP file in them, chunks of records, and the summary.
 
-The layouts are those of https://mcap.dev/spec. The `mcap` library reads most records; messages,
+The layouts are as in https://mcap.dev/spec. The `mcap` library reads most records; messages,
 chunks and their indexes are read here from a few bytes, so that a walk through a file does not read
-its data. A record whose parts contradict each other raises a `BadRecord`.
+its data. A record with parts that contradict each other raises a `BadRecord`.
 """
 
 from __future__ import annotations

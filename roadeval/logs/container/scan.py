@@ -117,7 +117,7 @@ class Scan:
             record = following
         size, ends = len(self.source), {gap.end for gap in self.gaps if gap.lossy}
         if ends and self.chunks and all(chunk.crc for chunk in self.chunks):
-            self.loose.clear()  # they may be those of a damaged chunk
+            self.loose.clear()  # they may belong to a damaged chunk
         if self.data_end is None and size not in ends:
             reason = "the file was never finished; what came after is not in it"
             self.gaps.append(Gap(size, size, reason))

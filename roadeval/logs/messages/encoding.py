@@ -1,7 +1,7 @@
 """Message encodings: from a message's bytes to its fields.
 
 Messages of images, calibrations, transforms and classes are recognised by their schema's name. The
-layouts are those of ROS, ``ffmpeg_image_transport_msgs`` and Foxglove; they are used if a schema
+layouts of ROS, ``ffmpeg_image_transport_msgs`` and Foxglove are known; they are used if a schema
 has no text, or a text that no library reads.
 """
 

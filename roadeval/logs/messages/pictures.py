@@ -340,7 +340,7 @@ class Video:
         return position
 
     def parameters(self, position: int) -> tuple[int, bytes]:
-        """Return where the parameters of a keyframe are, and those it lacks: some are sent once."""
+        """Return the place of a keyframe's parameters, and the parameters that it lacks there."""
         codec, units = codec_of(self._packets.picture(position)), b""
         near = range(position, max(position - 3000, -1), -1)
         for candidate in chain(near, range(min(PATIENCE, position), -1, -1)):

@@ -25,7 +25,7 @@ from roadeval.logs.topics.reader import TopicInfo, TopicReader
 from roadeval.runtime.sentence import Sentence
 
 OPTICAL: Final = np.array([-0.5, 0.5, -0.5, 0.5])
-"""The rotation from a camera's axes to those of a vehicle: x ahead, y left, z up (REP 103)."""
+"""The rotation from a camera's axes to a vehicle's: x ahead, y left, z up (REP 103)."""
 
 _UNREADABLE: Final = FrameError, BadMessage, AttributeError, TypeError, ValueError, OverflowError
 Transform = tuple[str, Floats, Floats]

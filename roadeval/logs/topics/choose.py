@@ -110,7 +110,7 @@ def choose_truth(
     """Choose the topic of the road truth.
 
     An image of single values is preferred, unless the settings name colours. ``of_rig`` says that
-    other cameras are replayed, too, whose labels are left out. A `LogError` if the named topic is
+    other cameras are replayed, too; their labels are left out. A `LogError` if the named topic is
     missing or no image; if several are candidates, or belong to another camera; or if the settings
     name values, and the only label images are compressed with loss.
     """

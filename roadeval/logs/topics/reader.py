@@ -80,7 +80,7 @@ class TopicInfo:
 
 def describe_topic(reader: TopicReader) -> TopicInfo:
     """Describe a topic by the places of its messages, and by the first readable one."""
-    # A topic may have channels of several schemas: that of messages which are read describes it.
+    # A topic may have channels of several schemas: a channel with messages that are read counts.
     _, channel, schema, _ = max(reader.channels, key=lambda source: _use_of(source.log))
     logs = [source.log for source in reader.channels if source.log.count]
     if pictures.kind_of(channel, schema) in (TopicKind.VIDEO, TopicKind.COMPRESSED):
@@ -126,7 +126,7 @@ def describe_topic(reader: TopicReader) -> TopicInfo:
 
 
 def _use_of(log: ChannelLog) -> tuple[bool, bool]:
-    return log.wanted and log.count > 0, log.count > 0
+    return log.is_wanted and log.count > 0, log.count > 0
 
 
 def median_period(log_times: npt.NDArray[np.int64]) -> int:
@@ -361,7 +361,7 @@ class TopicReader:
         return self.channels[number].container.is_bad(chunk)
 
     def parts(self, log_times: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
-        """Yield the bytes of the file that hold messages of some times: those of their chunks."""
+        """Yield the bytes of the file with the chunks that hold messages of some times."""
         positions = np.searchsorted(self.log_times[:-1], log_times)
         for _, number, chunk in self._places[positions].tolist():
             container = self.channels[number].container
@@ -453,7 +453,7 @@ def topic_readers(
     for container in containers:
         for channel_id, channel in sorted(container.channels.items()):
             schema = container.schemas.get(channel.schema_id)
-            log = container.logs.get(channel_id, ChannelLog(wanted=False))
+            log = container.logs.get(channel_id, ChannelLog(is_wanted=False))
             carriers = channels.setdefault(channel.topic, [])
             carriers.append(FileChannel(container, channel, schema, log))
     for topic, carriers in channels.items():

@@ -92,7 +92,7 @@ def _find_labels(
 
 @cache
 def _formats() -> dict[str, list[LabelFormat]]:
-    """Return the label formats by the endings of their files, those of other packages last."""
+    """Return the label formats by the endings of their files, other packages' formats last."""
     by_ending: dict[str, list[LabelFormat]] = {}
     for format_ in chain(
         collect(formats, "FORMAT"), installed("label_formats", LabelFormat, LogError)

@@ -317,7 +317,7 @@ def find_meaning(
                 tuple(map(_pack_color, colors))
                 for colors in (labels.road_colors, labels.ignore_colors)
             )
-        # A class that has a name may be rare, and so may all but one of those of road.
+        # A class that has a name may be rare, and so may all classes of road but one.
         codes: dict[Any, int] = {value: value for value in (*values, *names)}
         rare = [v for v in (*road, *other) if isinstance(v, int) and v not in codes]
         rare = rare if codes.keys() & {*road} else []
@@ -436,7 +436,8 @@ def class_names(
 ) -> dict[str, str]:
     """Return the names of a label topic's values, from the ``vision_msgs/LabelInfo`` beside it.
 
-    That is the one whose path shares most with the labels'. Empty without one, or if several do.
+    It is the topic with the path that shares most with the labels' path. Empty if there is none, or
+    if several share as much.
     """
     near = {
         topic.name: shared_parts(topic.name, label)
@@ -467,7 +468,7 @@ class LabelSource:
     notes: tuple[str, ...] = ()
     """Warnings about labels beside the log, a sentence each."""
     corrections: tuple[LabelSource, ...] = ()
-    """Labels that replace those of their frames; the first that has one counts."""
+    """Labels that replace the labels of their frames; the first that has one counts."""
 
     @property
     def is_confidence(self) -> bool:

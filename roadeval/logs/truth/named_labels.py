@@ -87,7 +87,7 @@ class NamedLabels:
     first: int = 0
     """The number in the name of the first frame's label."""
     nameless: int = 0
-    """Number of further labels whose names are no image's."""
+    """Number of further labels with names that no image has."""
     images: int | None = None
     """Number of images in the folder that names are compared with; None without such a folder."""
 

@@ -85,7 +85,7 @@ class Later:
 class Nearby:
     """Stamps of a topic near a moment; the others are estimated by their log times, not read.
 
-    The delay from stamp to log time is that of the stamps read so far, to within ``doubt``.
+    The delay from stamp to log time is known from the stamps read so far, to within ``doubt``.
     """
 
     topic: TopicReader

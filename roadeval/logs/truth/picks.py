@@ -33,9 +33,9 @@ class Why(StrEnum):
     """Why a frame was picked."""
 
     RANDOM = "random"
-    """Drawn at random: these estimate the error rate of the drive."""
+    """A frame drawn at random; such frames estimate the error rate of the drive."""
     RANKED = "ranked"
-    """Among the most doubtful: these are for inspection and training."""
+    """A frame among the most doubtful; such frames are for inspection and training."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ def is_road(folder: Path) -> bool:
 
 
 def truth_files(folder: Path) -> list[Path]:
-    """List the truth of the road, without that of the ego lane; test images have none."""
+    """List the truth of the road, without the truth of the ego lane; test images have none."""
     truth = folder / "gt_image_2"
     files = list_files(truth, {".png"}) if truth.is_dir() else []
     return [file for file in files if "_road_" in file.name]

@@ -195,8 +195,7 @@ class SidecarWriter(LogWriter):
     def write(self, result: FrameResult, frame_id: str, camera: str = "") -> None:
         """Write the results of a frame; frames come in the order of their log times.
 
-        ``frame_id`` is that of the image, ``camera`` its name in a rig. A `LogError` if the disk is
-        full.
+        ``frame_id`` is the image's, ``camera`` its name in a rig. A `LogError` if the disk is full.
         """
         root = "/".join(filter(None, (ROOT, camera.strip("/"))))
         frame = result.frame
@@ -372,8 +371,8 @@ def _read_frames(
 ) -> Iterator[tuple[int, bytes]]:
     """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
 
-    Frames are in the order in which they are shown, and so are their times: those of an AVI with
-    B-frames are in the order of decoding. Adds to the ``orientations`` from which frames are
+    Frames are in the order in which they are shown, and so are their times; an AVI with B-frames
+    has times in the order of decoding. Adds to the ``orientations`` from which frames are
     turned, and to the ``losses``. A `LogError` if the video cannot be read, or holds no video.
     """
     import av

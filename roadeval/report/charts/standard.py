@@ -180,7 +180,7 @@ def regions(
     """Return charts of the error rate in each region, and of its shares of errors and pixels.
 
     ``rates`` come from `roadeval.evaluation.tables.by_region`, ``shown`` has the titles of the
-    columns to draw, and ``titles`` those of the regions, from top to bottom.
+    columns to draw, and ``titles`` the titles of the regions, from top to bottom.
     """
     names, rates = rates.index.get_level_values("variant"), 100 * rates.droplevel("variant")
     percents = {variant: rates[names == variant].reindex([*titles]) for variant in variants}
@@ -285,8 +285,8 @@ def forest(drives: pd.DataFrame, over: Difference, label: str) -> Figure:
     """Return a chart of each drive's difference with its interval, the worst first, and the mean.
 
     ``drives`` has a row a drive: its ``name`` and ``group``, and the ``mean``, ``low`` and ``high``
-    of its difference as fractions; lower is better. Of more than `DRAWN` drives only the worst and
-    the best are drawn.
+    of its difference as fractions; lower is better. If there are more than `DRAWN` drives, only
+    the worst and the best are drawn.
     """
     ranked = drives.sort_values(["mean", "name"], ascending=[False, True])
     sentences = [caption("forest")]

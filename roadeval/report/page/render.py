@@ -1,8 +1,8 @@
 """Blocks rendered as a page for a browser by Jinja.
 
-Jinja (BSD-3-Clause, with MarkupSafe 0.8 MB) escapes every value that a template prints, so that no
-text of a log can become markup; Typst's own HTML has neither pictures nor style. A page loads
-nothing from anywhere: its content policy allows only its own script, style and pictures.
+Jinja (BSD-3-Clause, with MarkupSafe 0.8 MB) escapes every value that a template prints, so no text
+of a log can become markup. Typst, which makes the PDF, writes HTML without pictures and style. A
+page loads nothing: its content policy allows only its own script, style and pictures.
 """
 
 from __future__ import annotations
@@ -120,19 +120,19 @@ def source(image: ImageFile | bytes) -> str:
 
 
 def rows_of(table: Table) -> Iterator[tuple[list[tuple[Cell | str, bool]], str]]:
-    """Yield each row of a table: pairs of a cell and whether it repeats the one above; CSS classes.
+    """Yield the cells of each row, each with whether it repeats the cell above, and CSS classes.
 
-    An omitted word is the word of the row above, so a row keeps its meaning when the table is
+    An omitted word is taken from the row above, so that a row keeps its meaning when the table is
     sorted.
     """
     above: dict[int, Cell | str] = {}
     for place, row in enumerate(table.rows):
         cells: list[tuple[Cell | str, bool]] = []
         for column, cell in enumerate(row):
-            again = cell == "" and column in table.text_columns and column in above
-            if not again:
+            repeats = cell == "" and column in table.text_columns and column in above
+            if not repeats:
                 above[column] = cell
-            cells.append((above[column] if again else cell, again))
+            cells.append((above[column] if repeats else cell, repeats))
         total = all(isinstance(cell, Cell) and cell.bold for cell in row)
         classes = {"rule": place in table.breaks, "total": total}
         yield cells, " ".join(name for name, holds in classes.items() if holds)

@@ -75,8 +75,8 @@ def _frames(
 
 
 def reduced(frame: NotableFrame) -> NotableFrame:
-    """Return a frame whose pictures have the size that they have on paper, to save memory."""
-    width = SMALL if frame.rates else LARGE  # a mask is large where it is what there is to look at
+    """Return a frame with pictures of the size that they have on paper, to save memory."""
+    width = SMALL if frame.rates else LARGE  # without rates, people look at the masks
     layers = [[painted(image, width) for image in row] for row in frame.layers]
     return replace(frame, images=[painted(image, LARGE) for image in frame.images], layers=layers)
 

@@ -380,7 +380,7 @@ HOSTILE = {
     ),
     "deep JSON": ("1.json", b"[" * 100_000 + b"]" * 100_000, "more than 32 tables and lists"),
     "large JSON": ("1.json", None, f"314,572,800 bytes, and at most {GREATEST:,} are read"),
-    "a long line": ("1.txt", b"0" + b" -1" * 5000 + b" x", "line 1 is no class with an outline"),
+    "a long line": ("1.txt", b"0" + b" -1" * 5000 + b" x", "line 1 is not a class with an outline"),
 }
 
 

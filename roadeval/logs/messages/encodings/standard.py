@@ -30,7 +30,7 @@ _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 
 
 def cdr(schema: Schema | None) -> MessageReader | None:
-    """Return a reader of CDR, the encoding of ROS 2, in either byte order or as XCDR2.
+    """Return a reader of CDR, the encoding of ROS 2: either byte order, and XCDR2.
 
     Messages that rosbag2 has compressed are read as well.
     """
@@ -44,11 +44,11 @@ def cdr(schema: Schema | None) -> MessageReader | None:
 
     def read(data: Buffer) -> Any:
         message = _uncompressed(data)
-        # The library reads XCDR2 as the first version, which aligns longer numbers otherwise.
+        # The library takes XCDR2 for the first version, which aligns longer numbers differently.
         return layouts.read(message, None if bytes(message[1:2]) >= b"\6" else decode)
 
     def stamp(data: Buffer) -> Any:
-        """Read only the first field: the stamp, or a header with the stamp."""
+        """Return the stamp, which is the first field, or in the header that is the first field."""
         first = _after_head(_uncompressed(data)).read(fields[:1])
         return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
 
@@ -56,7 +56,7 @@ def cdr(schema: Schema | None) -> MessageReader | None:
 
 
 def _after_head(data: Buffer) -> FieldReader:
-    """Begin after the encapsulation; its second byte determines byte order and version."""
+    """Return a reader of the fields after the head, which tells byte order and version."""
     if len(data) < 4:
         raise BadMessage("a message without a head")
     kind = data[1]
@@ -65,7 +65,7 @@ def _after_head(data: Buffer) -> FieldReader:
 
 
 def _uncompressed(data: Buffer) -> Buffer:
-    """Undo rosbag2's compression of single messages; CDR itself never begins like zstd."""
+    """Return a message without rosbag2's compression; CDR itself never begins like Zstandard."""
     if bytes(data[:4]) != _ZSTD:
         return data
     import zstandard
@@ -77,7 +77,7 @@ def _uncompressed(data: Buffer) -> Buffer:
 
 
 def flatbuffer(schema: Schema | None) -> MessageReader | None:
-    """Return a reader of FlatBuffers, for Foxglove's messages alone."""
+    """Return a reader of Foxglove's messages in FlatBuffers; None for other messages."""
     import foxglove_schemas_flatbuffer as schemas
 
     fields = fields_of(schema)
@@ -89,7 +89,7 @@ def flatbuffer(schema: Schema | None) -> MessageReader | None:
 
 
 def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
-    """Read fields by their accessors, such as ``frame_id`` by ``FrameId``."""
+    """Return the fields that accessors read, such as ``frame_id`` by ``FrameId``."""
     values: dict[str, Any] = {}
     for name, kind in fields:
         accessor = name.title().replace("_", "")
@@ -113,12 +113,12 @@ def _flatbuffer_fields(message: Any, fields: Fields) -> SimpleNamespace:
 
 
 def read_json(data: Buffer) -> Any:
-    """Read a JSON message, with its bytes in base 64 or as a list of numbers."""
+    """Return a JSON message, which has its bytes in base 64 or as a list of numbers."""
     message = json.loads(bytes(data), object_hook=lambda fields: SimpleNamespace(**fields))
     if isinstance(content := getattr(message, "data", None), str):
         message.data = base64.b64decode(content, validate=True)
     elif hasattr(message, "data"):  # else it is no image
-        message.data = bytes([*message.data])  # bytes(5) would be five zeros
+        message.data = bytes([*message.data])  # an error for a number: bytes(5) is five zeros
     return message
 
 

@@ -1,4 +1,4 @@
-"""Label format: YOLO segmentation, in a text file for each image; points are shares of its size.
+"""Label format: YOLO segmentation, a text file an image; points are shares of the image's size.
 
 Classes have numbers; their names are in other files, which differ from tool to tool.
 """
@@ -14,7 +14,7 @@ from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.truth import shapes
 
 _LINE: Final = re.compile(r"^\s*-?\d+[ \t]+[-+.\d]|\A\s*\Z", re.MULTILINE)
-"""The beginning of a line of labels, which lines with names of classes do not have; or no line."""
+"""Matches a text with a line that begins like a label, unlike a list of classes, or no text."""
 
 
 def read(path: Path, content: str, size: shapes.Size | None) -> Iterator[shapes.DrawnLabel]:
@@ -30,22 +30,21 @@ def _shapes(content: str, size: shapes.Size) -> Iterator[shapes.Shape]:
             continue
         try:
             label, *shares = line.split()
-            flat = [float(share) * size[place % 2] for place, share in enumerate(shares)]
+            ring = [float(share) * size[place % 2] for place, share in enumerate(shares)]
             label = str(int(label))
-            if int(label) < 0 or len(flat) % 2 or len(flat) < 4:
+            if int(label) < 0 or len(ring) % 2 or len(ring) < 4:
                 raise ValueError
         except (ValueError, OverflowError) as error:
-            raise BadMessage(f"line {number} is no class with an outline") from error
-        if max(map(abs, map(float, shares))) > 2:  # shares somewhat above 1 are rounded
-            raise BadMessage(f"line {number} has points that are no shares of the image's size")
-        if len(flat) == 4:
-            x, y, width, height = (number / 2 for number in flat)
-            box = shapes.rectangle(
-                label, 2 * x - width, 2 * y - height, 2 * x + width, 2 * y + height
-            )
+            raise BadMessage(f"line {number} is not a class with an outline") from error
+        if max(map(abs, map(float, shares))) > 2:  # rounding makes shares a little more than 1
+            raise BadMessage(f"line {number} has points that are not shares of the image's size")
+        if len(ring) == 4:
+            x, y, width, height = ring
+            left, top = x - width / 2, y - height / 2
+            box = shapes.rectangle(label, left, top, x + width / 2, y + height / 2)
             yield shapes.Undrawn(label, "box without an outline", box)
         else:
-            yield shapes.Outline(label, flat)
+            yield shapes.Outline(label, ring)
 
 
 FORMAT: Final = shapes.LabelFormat(
