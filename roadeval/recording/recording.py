@@ -218,7 +218,8 @@ class Recording:
         if path not in self._codecs:
             remedy = f"there are {', '.join(sorted(self._codecs))}"
             raise RecordingError(f"there is no {path}", where=self.path, remedy=remedy)
-        if not (isinstance(frame, Real) and frame // 1 == frame):
+        number: object = frame
+        if not (isinstance(number, Real) and number // 1 == number):
             raise TypeError(f"frame: a whole number, not {frame!r}")
         codec = self._codecs[path]
         with name_damage(self.path, f"{path} on frame {frame}"):
