@@ -25,7 +25,7 @@ project = "roadeval"
 author = "the roadeval authors"
 release = roadeval.__version__
 extensions = ["myst_parser", "sphinx_copybutton"]
-# What commands print is no text to copy.
+# What commands print is not text to copy.
 copybutton_selector = "div:not(.highlight-text) > div.highlight > pre"
 copybutton_prompt_text = "$ "
 myst_heading_anchors = 4

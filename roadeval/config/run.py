@@ -380,7 +380,7 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
 def load_config(path: str | Path, *, trusted: bool = True) -> RunConfig:
     """Read the configuration of a run from a TOML file.
 
-    A `ConfigError` if the file is missing, is no TOML, or has a key or a value that cannot be used.
+    A `ConfigError` if the file is missing or not TOML, or has a key or a value that cannot be used.
 
     Parameters
     ----------

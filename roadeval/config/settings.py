@@ -19,7 +19,7 @@ SECTIONS: Final = (
 
 
 def _labels(labels: object) -> object:
-    """Return labels of results; a ValueError for a bad name, or a value that is no short line."""
+    """Return labels of results; a ValueError for a bad name or a value that is not a short line."""
     from roadeval.data import is_plain
 
     for name, text in labels.items() if isinstance(labels, Mapping) else ():

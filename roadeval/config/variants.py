@@ -153,7 +153,7 @@ def check_tables(tables: Mapping[str, Any], allowed: Collection[str]) -> None:
             continue
         if isinstance(table, Mapping):
             meant = likely(key, allowed)
-            raise ConfigError(f"[{key}] is no table here", remedy=f"{meant}choose {names}")
+            raise ConfigError(f"[{key}] is not a table here", remedy=f"{meant}choose {names}")
         raise ConfigError(f"{key} is in no table", remedy=f"put it below one of {names}")
 
 

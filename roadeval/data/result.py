@@ -133,7 +133,7 @@ class VariantResult:
     """The outputs of a variant's stages for one frame, in the order in which they ran.
 
     ``oracles[a][b]`` is the road mask of stage b after the output of stage a was replaced by the
-    truth. These masks are no results: see `roadeval.pipeline.chain.Chain`.
+    truth. These masks are not results: see `roadeval.pipeline.chain.Chain`.
     """
 
     variant: str

@@ -34,7 +34,7 @@ STEP: Final = 0.004
 MOST_POINTS: Final = 4000
 """Greatest number of points of a line."""
 GAP: Final = 0.3
-"""A gap in the road of fewer metres is no edge; straight ahead the limit is `GAP_AHEAD`."""
+"""A gap in the road of fewer metres is not an edge; straight ahead the limit is `GAP_AHEAD`."""
 GAP_AHEAD: Final = 0.5
 LEVELS: Final = 256
 """Thresholds of KITTI's road benchmark; its confidences have eight bits."""

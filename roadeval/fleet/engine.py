@@ -118,7 +118,7 @@ def _connect(stack: ExitStack, distributed: Any, scheduler: str) -> Any:
         client = distributed.Client(**place, timeout=ANSWER_S)
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise FleetError(
-            f"{scheduler} does not answer within {ANSWER_S} s, or is no Dask scheduler",
+            f"{scheduler} does not answer within {ANSWER_S} s, or is not a Dask scheduler",
             setting="fleet.scheduler",
             remedy="name it as tcp://host:8786, or by the file that it has written",
         ) from error

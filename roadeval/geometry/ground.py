@@ -187,7 +187,7 @@ def ground_of(
 
     ``logged`` is the calibration in the log, for images of ``size``; ``settings`` replace parts of
     it. The text is empty if there is neither. Only a roll of 0 is assumed, which the text says. A
-    `RoadevalError` if the settings are no possible camera.
+    `RoadevalError` if the settings are not a possible camera.
     """
     if size is None or (logged is None and not settings.given):
         return None, ""

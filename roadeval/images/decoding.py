@@ -156,7 +156,7 @@ def eight_bits(samples: Array, white: float | None = None) -> npt.NDArray[np.uin
 def _known_format(data: File) -> ImageFormat:
     format_ = format_of(data)
     if format_ is None:
-        raise ImageError(f"{len(data)} bytes that are no image of a known format")
+        raise ImageError(f"{len(data)} bytes that are not an image of a known format")
     return format_
 
 

@@ -45,7 +45,7 @@ def info(
     Raises
     ------
     RoadevalError
-        If it is no log, or cannot be read.
+        If it is not a log, or cannot be read.
     """
 
     def step(done: int, total: int) -> None:

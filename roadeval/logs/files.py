@@ -1,4 +1,4 @@
-"""The files of a log, the kinds of files that are no log, and folders of image files."""
+"""The files of a log, the kinds of files that are not a log, and folders of image files."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ _TIME_WITHIN: Final = re.compile(
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's files in natural order.
 
-    Files of a folder that are no MCAP files, or are missing, are returned as damage. A file is
+    Files of a folder that are not MCAP files, or are missing, are returned as damage. A file is
     missing if the folder's `METADATA` lists it, or if the others' numbers, from 0, have a gap. A
     `LogError` if there is no MCAP file; it names the files there, and how to convert them.
     """
@@ -141,7 +141,7 @@ def natural(path: Path) -> list[tuple[int, str]]:
 
 
 def content_problem(path: Path, file: IO[bytes]) -> str:
-    """Return what an open file is if it is no MCAP file; else empty."""
+    """Return what an open file is if it is not an MCAP file; else empty."""
     size = file.seek(0, 2)
     file.seek(0)
     head = file.read(_HEAD)

@@ -39,7 +39,7 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         try:
             at = datetime.fromisoformat(moment.upper() + zone.upper().replace("Z", "+00:00"))
         except ValueError as error:
-            raise LogError(f"{text!r} is no time: {error}") from error
+            raise LogError(f"{text!r} is not a time: {error}") from error
         since = at - _EPOCH
         seconds = since.days * 86400 + since.seconds
         return seconds * NS + int((fraction or "").ljust(9, "0"))
@@ -51,7 +51,7 @@ def parse_time(text: str, start_ns: int = 0) -> int:
         if seconds_text or fraction:
             return start_ns + int(seconds_text or 0) * NS + int(fraction[:9].ljust(9, "0"))
     raise LogError(
-        f"{elide(text, 40)!r} is no time: give seconds from the start (2.5), nanoseconds, or "
+        f"{elide(text, 40)!r} is not a time: give seconds from the start (2.5), nanoseconds, or "
         "2013-05-01T12:00:00Z"
     )
 

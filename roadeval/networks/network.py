@@ -391,7 +391,7 @@ _VARIES: Final = (
 def has_instances(file: OnnxFile) -> bool:
     """Return whether a file finds objects one by one, by its metadata or its outputs.
 
-    Such a file has a list of objects beside masks: an output of three dimensions that is no map.
+    Such a file has a list of objects beside masks: an output of three dimensions that is not a map.
     """
     names = " ".join(tensor.name.lower() for tensor in file.outputs)
     shapes = [tensor.shape for tensor in file.outputs]
@@ -404,7 +404,7 @@ def has_instances(file: OnnxFile) -> bool:
 
 
 def as_scores(output: Array, layout: str | None) -> Array | None:
-    """Return an output as classes, rows and columns; None if it is no map of the image.
+    """Return an output as classes, rows and columns; None if it is not a map of the image.
 
     A map is ``(1, C, h, w)``, or ``(1, h, w, C)`` if the input's layout is ``NHWC``; the first
     dimension, or the dimension of the classes, may be absent.
@@ -418,7 +418,7 @@ def as_scores(output: Array, layout: str | None) -> Array | None:
 
 
 def check_image(file: OnnxFile) -> None:
-    """Raise a `NetworkError` if the input is no image."""
+    """Raise a `NetworkError` if the input is not an image."""
     taken = file.inputs[0]
     shape = taken.shape if len(file.inputs) == 1 else ()
     if len(shape) == 4 and (shape[0] or 1) > 1:
@@ -490,7 +490,7 @@ def complete_output(
     # A map has about the proportions of the input; numbers of classes fill one channel.
     is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
     if not is_map or (is_classes and count != 1):
-        raise file.question(f"its output {name!r} is no map of the image, but {sample.shape}")
+        raise file.question(f"its output {name!r} is not a map of the image, but {sample.shape}")
     is_scored = sample.low < 0 or sample.several or settings.activation in ("sigmoid", "softmax")
     if is_integer and is_scored:
         raise file.question(

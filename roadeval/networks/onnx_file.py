@@ -97,7 +97,7 @@ class OnnxFile:
         """Compute some outputs for the values of the one input, within some seconds.
 
         The process may grow by ``grown`` bytes meanwhile. A `NetworkError` if that fails, or an
-        output is no array of numbers.
+        output is not an array of numbers.
         """
         from onnxruntime import RunOptions
 
@@ -114,7 +114,7 @@ class OnnxFile:
                 raise
         for name, array in zip(outputs, arrays, strict=True):
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf":
-                raise self.question(f"its output {name!r} is no array of numbers")
+                raise self.question(f"its output {name!r} is not an array of numbers")
         return list(arrays)
 
     def check_size(self, tensor: Tensor, limit: int) -> None:

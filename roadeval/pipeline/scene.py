@@ -35,7 +35,7 @@ THIN, WIDE = 3, 15
 SURROUNDINGS: Final = 31
 """Side of the square that an edge is compared with: on a smooth pavement a low kerb is steep."""
 FAINT: Final = 0.02
-"""Added to that square's mean edge: noise is no edge."""
+"""Added to that square's mean edge: noise is not an edge."""
 BARRIERS: Final = {"edge": 1.0, "relative_edge": 0.05, "hue_edge": 1.0, "yellow": 1.0, "dark": 1.0}
 """Weights of barriers in the cost of a path."""
 SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}

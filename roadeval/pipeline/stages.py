@@ -37,7 +37,7 @@ ARGUMENTS: Final = ("image", "moment", "settings")
 
 
 class UnknownStageError(RoadevalError, LookupError):
-    """A name in a chain that is no stage: which, and why."""
+    """A name in a chain that is not a stage: which, and why."""
 
 
 @cache
@@ -122,7 +122,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
         raise TypeError("it has no argument image")
     default = arguments["settings"].default if "settings" in arguments else NoSettings()
     if isinstance(default, type) or not is_dataclass(default):
-        raise TypeError("the default of its argument settings is no instance of a dataclass")
+        raise TypeError("the default of its argument settings is not an instance of a dataclass")
     first_line = (inspect.getdoc(function) or "").partition("\n")[0].rstrip(".")
     spec = mask_spec(name, first_line or name)
 
@@ -136,12 +136,13 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
             raise ValueError(f"it returned {array.dtype} {array.shape}, not an (H, W) mask")
         if array.dtype.kind == "f":
             if not ((array >= 0) & (array <= 1)).all():
-                raise ValueError("it returned floats that are no probabilities, from 0 to 1")
+                raise ValueError("it returned floats that are not probabilities, from 0 to 1")
             product = np.multiply(array, CERTAIN, dtype=np.result_type(array, np.float32))
             codes = np.rint(product).astype(np.uint16)  # float16 does not hold 65535
             array = codes > round(CERTAIN / 2)
         elif array.size and not np.isin(array, (0, max(array.max(), 1))).all():
-            raise ValueError("it returned whole numbers that are no mask of 0 and one other level")
+            problem = "it returned whole numbers that are not a mask of 0 and one other level"
+            raise ValueError(problem)
         mask = Packed.of(array != 0)
         return Output((Layer(spec, mask),), mask=mask, probability=codes)
 
@@ -206,7 +207,7 @@ KINDS: Final[Mapping[LayerKind, ArrayKind]] = {
 
 
 def check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
-    """Raise an error if this is no output, or one of its arrays has a wrong size or type."""
+    """Raise an error if this is not an output, or one of its arrays has a wrong size or type."""
     if not isinstance(output, Output):
         raise TypeError(f"it returned {type(output).__name__}, not Output")
     size = view.image.shape[:2]

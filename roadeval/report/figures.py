@@ -78,7 +78,7 @@ RC: Final[dict[str, Any]] = {
     "legend.fontsize": LETTERS,
     "svg.fonttype": "none",
     "svg.hashsalt": "roadeval",
-    "text.parse_math": False,  # a dollar in a name is no formula
+    "text.parse_math": False,  # a dollar in a name is not a formula
     "savefig.facecolor": "white",
 }
 """Matplotlib's settings for every figure; in an SVG, and so in a PDF, text stays text."""

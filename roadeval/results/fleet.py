@@ -127,7 +127,7 @@ class Made(FactsFile):
     """Digest of the settings, the model and the version."""
     stamp: Mapping[Any, Any] | None
     """Sizes and times of the log's files, a cheap way to notice changes; None if they could not be
-    read. A file's name may hold bytes that are no text."""
+    read. A file's name may hold bytes that are not text."""
     fold: int | None = None
     model: str | None = None
     problem: str = ""
@@ -365,7 +365,7 @@ class FleetWriter:
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
             elif not (self.folder / RESULTS).is_dir() and any(self.folder.glob("*")):
                 raise ResultsError(
-                    f"{self.folder}: holds other files and is no fleet's folder; name a new one"
+                    f"{self.folder}: holds other files and is not a fleet's folder; name a new one"
                 )
             (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
             for path in self.folder.iterdir():  # the folder may come from anybody

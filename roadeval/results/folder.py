@@ -131,7 +131,7 @@ class _GrowingTable:
         self.path = folder / f"{table.name}{PACKED if packed else CSV}"
         # Without the time of writing, equal tables are equal files.
         self.file = gzip.GzipFile(self.path, "wb", 6, mtime=0) if packed else self.path.open("wb")
-        self.rows = -1  # the header is no row
+        self.rows = -1  # the header is not a row
         self._digest = hashlib.sha256()
         self.append(table.header)
 

@@ -181,7 +181,7 @@ def _parse_csv(
         check_texts(names)
         for name in names if column.kind is Kind.NAME else ():
             if not is_plain(name):
-                raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
+                raise ValueError(f"{name[:NAMED]!r} in column {column.name} is not a name")
     return parsed
 
 
@@ -219,8 +219,8 @@ def _words_of(cells: pa.ChunkedArray) -> list[str]:
 def write_parquet(tables: Mapping[Path, tuple[str, pd.DataFrame]], made_of: str = "") -> None:
     """Write tables of a fleet; the files get their names when all of them are written.
 
-    ``tables`` has the name and the rows of each file; NaN is no value. ``made_of`` is the SHA-256
-    of the summary from which they were made. An OSError if one cannot be written.
+    ``tables`` has the name and the rows of each file; NaN is not a value. ``made_of`` is the
+    SHA-256 of the summary from which they were made. An OSError if one cannot be written.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -342,7 +342,7 @@ def _read_files(
             check_texts(texts[code] for code in codes)
     for drive in rows["drive"].unique().to_pylist():  # files have the names of drives
         if not is_plain(drive):
-            raise ValueError(f"a drive is called {drive[:NAMED]!r}, which is no name")
+            raise ValueError(f"a drive is called {drive[:NAMED]!r}, which is not a name")
     tags = [name for name in rows.column_names if of_drives and name.startswith(TAG)]
     return rows.select([*names, *tags, *(["run"] if runs else [])])
 

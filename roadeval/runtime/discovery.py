@@ -67,7 +67,7 @@ def installed(
             several = isinstance(loaded, list | tuple) and not isinstance(loaded, expected)
             for thing in loaded if several else [loaded]:
                 if not isinstance(thing, expected):
-                    raise TypeError(f"{point.value} is no {expected.__name__}")
+                    raise TypeError(f"{point.value} is not a {expected.__name__}")
                 if (name := str(getattr(thing, "name", ""))) in names:
                     raise ValueError(f"the name {name!r} is taken")
                 names |= {name} - {""}

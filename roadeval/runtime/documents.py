@@ -36,7 +36,7 @@ DOTS: Final = 2_000
 
 
 def read_bounded(path: Path, most: int = BYTES) -> bytes:
-    """Return the bytes of a document; an OSError if it is no file, a ValueError if too large."""
+    """Return the bytes of a document; an OSError if it is not a file, a ValueError if too large."""
     check_input(path)
     _check_size(path.stat().st_size, most)
     with path.open("rb") as file:
@@ -106,7 +106,7 @@ def explaining() -> Iterator[None]:
         raise ValueError(_TOO_DEEP) from error
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
-        raise ValueError(f"it is no JSON, or ends early ({place})") from error
+        raise ValueError(f"it is not JSON, or ends early ({place})") from error
     except UnicodeDecodeError as error:
         raise ValueError("it is not in UTF-8") from error
     except ValueError as error:

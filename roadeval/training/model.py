@@ -181,7 +181,7 @@ def read_archive(path: Path) -> tuple[Any, Arrays]:
                 raise ValueError("no model unpacks to so much")
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        # NumPy returns members that are no arrays as bytes.
+        # NumPy returns members that are not arrays as bytes.
         if not all(isinstance(array, np.ndarray) for array in arrays.values()):
             raise ValueError("not all of it is arrays")
         return json.loads(arrays.pop("header").tobytes()), arrays
@@ -217,7 +217,7 @@ def make_model(content: dict[str, Any], arrays: Arrays, stages: Mapping[str, Sta
     parameters: dict[str, dict[str, Any]] = {variant: {} for variant in header.settings}
     for (variant, stage), part in parts.items():
         if stage not in stages or (kind := stages[stage].parameters) is None:
-            raise ValueError(f"{variant}/{stage} is no stage that learns")
+            raise ValueError(f"{variant}/{stage} is not a stage that learns")
         try:
             parameters[variant][stage] = from_arrays(kind, part)
         except ValueError as error:

@@ -73,7 +73,7 @@ def test_what_was_left_out_is_told_and_decides_the_exit_code(tmp_path, monkeypat
     write_log(tmp_path / "broken.mcap", broken=8)
     assert main(["train", "broken.mcap", "-o", "m.model", "--train-frames", "3", "-q"]) == 3
     stderr = capsys.readouterr().err
-    assert "roadeval: lost: frame 8: 8 bytes that are no image" in stderr
+    assert "roadeval: lost: frame 8: 8 bytes that are not an image" in stderr
     assert "roadeval: lost: 1 of 3 training frames could not be decoded" in stderr
     assert (tmp_path / "m.model").exists()
 

@@ -47,7 +47,7 @@ WRONG = {
     "a label twice": ["a.mcap", "--label", "branch=a", "--label", "branch=b"],
     "a scale of nothing": ["a.mcap", "--scale", "0"],
     "a scale that enlarges": ["a.mcap", "--scale", "1.5"],
-    "a scale that is no number": ["a.mcap", "--scale", "nan"],
+    "a scale that is not a number": ["a.mcap", "--scale", "nan"],
     "reduced masks beside the log": ["a.mcap", "--scale", "0.5", "--mcap", "b.mcap"],
 }
 
@@ -73,7 +73,7 @@ def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
         ("replay a.mcap --xyzzy", "No such option: --xyzzy; see"),
         (
             "report a.rrd --figures f --width 8.5",
-            "8.5 is no width of a figure; write it as 8.5cm",
+            "8.5 is not a width of a figure; write it as 8.5cm",
         ),
     ],
 )
@@ -265,8 +265,8 @@ def test_a_signal_has_its_own_exit_code_and_tells_what_is_left(code, name, capsy
 
 
 def test_wrong_usage_points_to_the_help(capsys):
-    assert explain(typer.BadParameter("'x' is no number.")) == 2
-    assert lines(capsys) == ["roadeval: error: 'x' is no number"]
+    assert explain(typer.BadParameter("'x' is not a number.")) == 2
+    assert lines(capsys) == ["roadeval: error: 'x' is not a number"]
     assert main(["replay", "--no-such-option"]) == 2
     assert lines(capsys) == [
         "roadeval: error: No such option: --no-such-option; see 'roadeval replay --help'"

@@ -43,7 +43,7 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ),
         (
             "[shadows]\nring_width = 1",
-            r"\[shadows\] is no table here; did you mean shadow\? choose .*shadow",
+            r"\[shadows\] is not a table here; did you mean shadow\? choose .*shadow",
         ),
         ("shadow = 3", r"shadow: must be a table"),
         ("[svm]\ngamma = nan", r"svm\.gamma: .*finite"),
@@ -54,12 +54,12 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
         ("[labels]\nroad = 3", r"labels\.road: must be a list \(given: 3\)"),
         (f"[topics]\nimage = ['{'x' * 999}']", r"must be text \(given: \[\"x{58}\.\.\.\)$"),
         ("[frames]\nscale = 1.5", r"frames\.scale: .*\(given: 1.5\)"),
-        ("[frames]\nstart = 'noon'", "'noon' is no time"),
+        ("[frames]\nstart = 'noon'", "'noon' is not a time"),
         ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
         ("[labels]\nroad_colors = [[1, 2]]", r"labels\.road_colors: item 1 is too short"),
         ("[labels]\nroad = [3, -40000]", r"labels\.road: item 2 .*\(given: -40000\)"),
         ("[training.patch]\nx = 1", r"training\.patch.x: .*choose bottom, bottom_width, top"),
-        ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
+        ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is not a time"),
         ("chain = [['post']]", r"no stage \['post'\]"),
         ("ring_width = 3", "ring_width is in no table; put it below one of .*shadow"),
         ("[output]\nsave = 'g.toml'", r"output.save: g.toml does not end in .rrd"),
@@ -199,7 +199,7 @@ def test_masks_are_those_of_the_drive():
 
 
 def test_what_is_no_drive_s_and_masks_that_lie_nowhere_are_refused_of_a_drive():
-    with pytest.raises(ConfigError, match=r"\[training\] is no table here; choose frames, ground,"):
+    with pytest.raises(ConfigError, match=r"\[training\] is not a table here; choose frames,"):
         configure().of_drive({"training": {}})
     with pytest.raises(ConfigError, match=r"\[masks.net\] has no path"):
         configure({"masks": {"net": {"threshold": 0.5}}}).for_drive("a.mcap")

@@ -86,7 +86,7 @@ def test_a_limit_that_cannot_be_judged_is_an_error_in_every_file(demo, worse, tm
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (["--fail-if", "ERR > 1"], 2, "is no condition"),
+        (["--fail-if", "ERR > 1"], 2, "is not a condition"),
         (["--fail-if", "post.filtered.ERR > 101%"], 2, "101 is not from 0 to 100: no ERR is"),
         (["--fail-if", "post.filtered.ERR < -101pp"], 2, "-101 is not from -100 to 100: no ERR"),
         (["-o", "change.docx"], 2, "the name must end in .pdf, .html, .md, .json or .svg"),

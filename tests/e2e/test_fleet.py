@@ -213,7 +213,7 @@ def digests(path):
 
 def test_a_folder_with_other_files_is_refused(drives, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(RoadevalError, match="holds other files and is no fleet's folder"):
+    with pytest.raises(RoadevalError, match="holds other files and is not a fleet's folder"):
         run(drives, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 

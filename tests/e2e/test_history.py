@@ -80,7 +80,7 @@ def test_the_last_run_is_guarded_and_the_last_good_one_is_a_base(nights, tmp_pat
         (("{empty}",), 1, "holds no results"),
         (("{nights}/03",), 1, "a history needs two runs"),
         (("{nights}", "--by", "build"), 1, "has no label build"),
-        (("{nights}", "--fail-if", "ERR"), 2, "is no condition"),
+        (("{nights}", "--fail-if", "ERR"), 2, "is not a condition"),
         (("{nights}", "-o", "x.txt"), 2, "the name must end in"),
         (("{nights}", "-o", "{nights}/03/summary.json"), 1, "is an input"),
     ],

@@ -155,7 +155,7 @@ def test_a_drives_name_is_no_path(fleet, name):
 def test_a_drives_name_in_the_tables_alone_is_no_path(fleet):
     called(fleet, "../../mine/x", summary=False)
     runs, _, _ = looked_into(fleet)
-    assert "a drive is called '../../mine/x', which is no name" in runs["worst"].stderr
+    assert "a drive is called '../../mine/x', which is not a name" in runs["worst"].stderr
     assert {run.returncode for run in runs.values()} == {1}
 
 

@@ -52,7 +52,7 @@ class Forks:
 
 def serve() -> None:
     """Run what is asked for on the standard input, until that ends."""
-    # What a run prints is no answer.
+    # What a run prints is not an answer.
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     with tempfile.TemporaryDirectory() as folder:

@@ -116,7 +116,7 @@ def _memory(*, forget: bool = False) -> int:
 def _said() -> int:
     """Return how many bytes standard error holds, which a C library may have written.
 
-    0 where it is no file: in a worker and in the tests it is one.
+    0 where it is not a file: in a worker and in the tests it is one.
     """
     status = os.fstat(2)
     return status.st_size if stat.S_ISREG(status.st_mode) else 0

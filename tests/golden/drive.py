@@ -2,7 +2,7 @@
 
 No random generator and no lossy codec takes part, so that the same frames come out everywhere.
 What a report has to tell something about is in it: true shadow, ignored pixels, frames without
-truth, one without road, one that is no image, and masks of a network.
+truth, one without road, one that is not an image, and masks of a network.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HORIZON = 18
 START_NS = 1_777_888_999_000_000_000
 PERIOD_NS = 100_000_000
 BROKEN = 21
-"""The frame that is no image."""
+"""The frame that is not an image."""
 UNLABELLED = (12, 17, 30)
 """The frames without truth."""
 NO_ROAD = 33

@@ -172,7 +172,7 @@ def test_a_report_takes_no_audit_of_another_drive(audited, place, tmp_path) -> N
         other.write_text(json.dumps(wrong))
         with pytest.raises(RoadevalError, match=problem):
             roadeval.write_report(place / "drive.rrd", tmp_path / "r.pdf", audit=other.parent)
-    with pytest.raises(RoadevalError, match=r"is no folder of roadeval audit"):
+    with pytest.raises(RoadevalError, match=r"is not a folder of roadeval audit"):
         roadeval.write_report(place / "drive.rrd", tmp_path / "r.pdf", audit=tmp_path)
     assert not (tmp_path / "r.pdf").exists()
 

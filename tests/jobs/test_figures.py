@@ -35,5 +35,5 @@ def test_a_fleet_has_no_figures(tmp_path):
 
 @pytest.mark.parametrize("width", ["8.5", "cm", "3cm", "9km", "nanmm", "1e9in"])
 def test_a_width_without_sense_is_refused_before_anything_is_read(width, tmp_path):
-    with pytest.raises(RoadevalError, match=f"^{width} is no width of a figure; write it as 8.5cm"):
+    with pytest.raises(RoadevalError, match=f"^{width} is not a width of a figure; write it as"):
         roadeval.write_figures("not there", tmp_path, width=width)

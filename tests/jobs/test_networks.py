@@ -217,7 +217,7 @@ def test_what_it_learns_stands_in_a_model_file(drive, tmp_path):
     model = roadeval.train([drive], path, config)
     outcome = run_settings(drive, tmp_path, variants=variants, model=path)
     assert outcome.summary["totals"]["mine"]["post"]["ERR"] < 0.05
-    with pytest.raises(roadeval.RoadevalError, match="mine/bright is no stage that learns"):
+    with pytest.raises(roadeval.RoadevalError, match="mine/bright is not a stage that learns"):
         roadeval.load_model(path)  # a file by itself loads nobody's code
     own = config.pipelines()["mine"].stages()
     assert roadeval.load_model(path, own).parameters["mine"] == model.parameters["mine"]

@@ -383,7 +383,7 @@ def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
 
 
 def split_without_its_second_file(folder):
-    """A folder of a split log; one of its files is no log."""
+    """A folder of a split log; one of its files is not a log."""
     folder.mkdir()
     write_log(folder / "split_0.mcap")
     (folder / "split_1.mcap").write_bytes(b"no log")

@@ -457,7 +457,7 @@ def test_a_time_is_read_to_the_nanosecond(text: str, ns: int, relative: bool) ->
     ],
 )
 def test_anything_else_is_refused(text: str) -> None:
-    with pytest.raises(LogError, match="is no time"):
+    with pytest.raises(LogError, match="is not a time"):
         parse_time(text)
 
 

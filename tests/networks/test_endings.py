@@ -154,7 +154,7 @@ def test_logits_that_are_called_probabilities_are_refused(tmp_path):
 
 
 def test_scores_of_several_classes_are_no_map_of_classes(tmp_path):
-    with pytest.raises(NetworkError, match="no map of the image"):
+    with pytest.raises(NetworkError, match="not a map of the image"):
         road_of(tmp_path / "n.onnx", TWO, activation="classes", road=(1,))
 
 

@@ -254,7 +254,7 @@ ASKED = {
     "whole numbers of a scale": ({"dtype": TensorProto.INT8}, {}, "by a scale"),
     "five channels": ({"input_shape": (1, 5, 12, 16)}, {}, "inputs: image"),
     "an operator that is not known": ({"operator": "Unheard"}, {}, "cannot run the network: "),
-    "an output that is no map": ({"last": "GlobalAveragePool"}, {}, "is no map of the image"),
+    "an output that is not a map": ({"last": "GlobalAveragePool"}, {}, "is not a map of the image"),
     "numbers that no image has": ({"dtype": TensorProto.INT64}, {}, "takes no image"),
 }
 

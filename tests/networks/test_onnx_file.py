@@ -127,8 +127,8 @@ SIZES = {
     "rows and columns, stated": ((12000, 16000), True, "takes 732 MiB"),
     "rows and columns": ((12000, 16000), False, "takes 732 MiB"),
     "classes, stated": ((9999, 120, 160), True, "takes 732 MiB"),
-    "nothing": ((0, 12, 16), False, "no map of the image, but (1, 0, 12, 16)"),
-    "five lengths": ((2, 3, 12, 16), False, "no map of the image, but (1, 2, 3, 12, 16)"),
+    "nothing": ((0, 12, 16), False, "not a map of the image, but (1, 0, 12, 16)"),
+    "five lengths": ((2, 3, 12, 16), False, "not a map of the image, but (1, 2, 3, 12, 16)"),
 }
 
 
@@ -155,7 +155,7 @@ def test_an_output_without_numbers_is_refused(operator, tmp_path):
         sequence = helper.make_sequence_type_proto(kind)
         model.graph.output[0].CopyFrom(helper.make_value_info(ROAD, sequence))
         onnx.save(model, path)
-    assert "no array of numbers" in refused(path)
+    assert "not an array of numbers" in refused(path)
 
 
 @pytest.mark.parametrize("content", [None, b"hello", b"\x89PNG\r\n\x1a\n", bytes(1000)])

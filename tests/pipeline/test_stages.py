@@ -85,8 +85,8 @@ def test_an_error_names_the_stage_and_keeps_its_cause():
     [
         ("wrong_size", r"its mask is \(2, 2\)"),
         ("leaves", r"leaves failed: SystemExit: 0 \(somebody.py:"),
-        ("levels_of_grey", "no mask of 0 and one other level"),
-        ("minus_one_elsewhere", "no mask of 0 and one other level"),
+        ("levels_of_grey", "not a mask of 0 and one other level"),
+        ("minus_one_elsewhere", "not a mask of 0 and one other level"),
         ("LAYERS", "a layer 'level' that its stage does not"),
     ],
 )

@@ -503,7 +503,7 @@ def test_a_column_that_one_of_several_files_lacks_is_damage(folder):
 # --- How a drive's results were made: written and read back as it was -----------------------------
 
 MADE = Made("a", "asked", {"caf\udce9.mcap": [1, 2]})
-"""A file's name holds a byte that is no text."""
+"""A file's name holds a byte that is not text."""
 
 
 @pytest.fixture

@@ -58,7 +58,7 @@ def test_an_entry_point_adds_one_thing_or_several(package):
     ("code", "problem"),
     [
         ("import nowhere", "No module named 'nowhere'"),
-        ("THING = 3", "things:THING is no Region"),
+        ("THING = 3", "things:THING is not a Region"),
         ("class Named(Region):\n    name = 'mine'\nTHING = Named({}, 1, None)", "'mine' is taken"),
     ],
 )

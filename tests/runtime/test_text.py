@@ -91,7 +91,7 @@ MANY = "y" * 1_001
         *((deep, "nests more than 32") for deep in ("[" * 100_000, "[" * 40 + "]" * 40)),
         ('{"a":' * 40 + "1" + "}" * 40, "nests more than 32"),
         ("9" * 5_000, "^a number in it has thousands of digits$"),
-        ('{"a": [1,', r"^it is no JSON, or ends early \(line 1, column 10\)$"),
+        ('{"a": [1,', r"^it is not JSON, or ends early \(line 1, column 10\)$"),
         (b'"\xff"', "^it is not in UTF-8$"),
     ],
 )
@@ -153,7 +153,7 @@ class Base:
 
     least: The least
         number.
-    note: This is no field, and so no setting.
+    note: This is not a field, and so no setting.
     """
 
     least: int = 1

@@ -82,7 +82,7 @@ class Condition:
         match = _GRAMMAR.fullmatch(text)
         if match is None:
             raise RoadevalError(
-                f"{text!r} is no condition; write STAGE.VARIANT.RATE, one of > >= < <=, and a "
+                f"{text!r} is not a condition; write STAGE.VARIANT.RATE, one of > >= < <=, and a "
                 "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'; a 'surely' "
                 "after pp means the whole interval"
             )

@@ -214,7 +214,7 @@ class FitCheck:
         self._open: list[tuple[int, dict[str, _Mask]]] = []
         """Frame number and masks of each spot that waits for later neighbours."""
         self._fits = defaultdict[Finding, dict[int, Floats]](dict)
-        """Fits by change and by frame of a spot; a lag of 0 is no change."""
+        """Fits by change and by frame of a spot; a lag of 0 is not a change."""
         self._moves = defaultdict[str, list[tuple[Floats, Floats]]](list)
         """The fit at each of `_MOVES`, and without a move the agreement with the image at each of
         `_GROWTHS`, for each spot by subject."""

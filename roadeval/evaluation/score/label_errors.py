@@ -2,7 +2,7 @@
 
 Methods and the labels of the frames before and after, moved with the picture, predict each label.
 The rarer a prediction is wrong there on other frames, near frames above all, the more it counts: an
-error that a method always makes is no sign against a label.
+error that a method always makes is not a sign against a label.
 """
 
 from __future__ import annotations

@@ -166,7 +166,7 @@ def within_drive(pairs: pd.DataFrame, rate: str, settings: EvaluationSettings) -
     ``pairs`` are rows from `roadeval.evaluation.tables.pair_rows`, with columns ``camera``,
     ``stamp_ns``, the rate, and the base's rate, which ends in ``_base``. Frames without a
     difference are left out. The mean over several cameras is the mean of their means. Frames of the
-    same time are no further evidence: a copy of a camera changes nothing, see `at_moments`.
+    same time are not further evidence: a copy of a camera changes nothing, see `at_moments`.
     """
     stamps, base = pairs["stamp_ns"].to_numpy(), pairs[f"{rate}_base"].to_numpy()
     differences, camera = pairs[rate].to_numpy() - base, pairs["camera"].factorize()[0]

@@ -135,7 +135,7 @@ def estimate(
     lower, upper = np.quantile(every_score, (0.25, 0.75))
     far = upper + FAR * (upper - lower)
     unseen = int(np.count_nonzero(every_score > far))
-    if unseen < 2 or (scores > far).any():  # A single frame is no burst.
+    if unseen < 2 or (scores > far).any():  # A single frame is not a burst.
         unseen = 0
     seen = 1 - unseen / frames
     low, high = low * seen, high * seen + 1 - seen

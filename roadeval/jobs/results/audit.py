@@ -158,7 +158,7 @@ def _find_suspects(drive: DriveResult, frames: Sequence[int], count: int) -> pd.
 def read_doubts(folder: AnyPath, drive: DriveResult) -> list[str]:
     """Read the sentences on the labels of a drive from the folder of its audit.
 
-    A `RoadevalError` if it is no such folder, or of another drive.
+    A `RoadevalError` if it is not such a folder, or of another drive.
     """
     path = Path(folder, AUDIT)
     try:
@@ -166,7 +166,7 @@ def read_doubts(folder: AnyPath, drive: DriveResult) -> list[str]:
         sentences = TypeAdapter(list[str]).validate_python(about["sentences"])
         name, camera = about["drive"], about["camera"]
     except FileNotFoundError:
-        problem = "is no folder of roadeval audit"
+        problem = "is not a folder of roadeval audit"
         raise RoadevalError(problem, where=folder, remedy="make one with -o") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = str(error).partition("\n")[0]

@@ -204,7 +204,7 @@ def find_results(path: Path) -> list[Path]:
 def last_good(listing: Listing, on_progress: OnProgress = ignore) -> tuple[Path, Sequence[str]]:
     """Return the result of the first place, or its newest run before a lasting step to worse.
 
-    Results of the other places are no runs of the folder. The runs that could not be read are
+    Results of the other places are not runs of the folder. The runs that could not be read are
     returned, too, and why. A `RoadevalError` if none can be read.
     """
     (place, runs), *others = listing.places

@@ -103,7 +103,7 @@ def inches_of(width: str) -> float:
     least, most = WIDTHS
     if not least - 1e-9 <= 2.54 * inches <= most + 1e-9:
         raise RoadevalError(
-            f"{width} is no width of a figure",
+            f"{width} is not a width of a figure",
             remedy=f"write it as 8.5cm, 85mm or 3.35in, from {least} to {most} cm",
         )
     return inches

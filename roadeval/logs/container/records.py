@@ -258,7 +258,7 @@ def record_at(records: Bytes, offset: int) -> Record:
 
 
 def walk(records: Bytes) -> Iterator[Record]:
-    """Yield the complete records of a chunk, up to the first zeros, which are no records."""
+    """Yield the complete records of a chunk, up to the first zeros, which are not records."""
     offset, size = 0, len(records)
     while offset + HEAD.size <= size:
         record = record_at(records, offset)

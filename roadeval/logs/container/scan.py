@@ -292,7 +292,7 @@ class Scan:
         return record._replace(content=self._content(record, head))
 
     def _content(self, record: Record, head: bytes) -> Any:
-        """Read a record that is no chunk; return channel and log time of a message."""
+        """Read a record that is not a chunk; return channel and log time of a message."""
         opcode, offset, body, end, _ = record
         if opcode == Opcode.ATTACHMENT:
             at, inner = body + 16, inf
@@ -371,7 +371,7 @@ class Scan:
     def _next(self, begin: int, doubted: Record) -> Record:
         """Find the next valid record at or after ``begin``, or the end of the file.
 
-        The damage is in or behind the record ``doubted``. Records in a chunk are no records of the
+        The damage is in or behind the record ``doubted``. Records in a chunk are not records of the
         file.
         """
         size = len(self.source)

@@ -138,7 +138,7 @@ def to_rgb(picture: Picture, limits: Limits, white: float | None = None) -> Rgb:
         return picture.pixels
     if isinstance(picture, CompressedPicture):
         if _is_depth(picture):
-            raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
+            raise BadMessage(f"it holds depth ({picture.format}), which is not a camera image")
         with _bad_message():
             return decoding.to_rgb(picture.data, limits, white)
     import cv2
@@ -235,7 +235,7 @@ def _file_in(picture: CompressedPicture | DecodedPicture) -> Buffer | None:
 
 
 def file_of(picture: CompressedPicture) -> Buffer:
-    """Return a picture's image file; a `BadMessage` if it has depth that is no PNG."""
+    """Return a picture's image file; a `BadMessage` if it has depth that is not a PNG."""
     if not _is_depth(picture):
         return picture.data
     if re.search("(?i)32fc1|rvl", picture.format):

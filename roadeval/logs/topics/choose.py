@@ -220,7 +220,7 @@ def _is_another(of_label: set[str], of_image: set[str], *of_others: set[str]) ->
 def check_names(names: Sequence[str], image: TopicInfo, topics: Sequence[TopicInfo]) -> None:
     """Raise a `LogError` if names of labels have the name of another camera, or of several.
 
-    Numbers of frames, as in ``cam_0012.png``, are no part of a camera's name.
+    Numbers of frames, as in ``cam_0012.png``, are not part of a camera's name.
     """
     ours, *others = (
         f"{topic.name} {topic.frame_id}" for topic in (image, *_other_cameras(topics, image))

@@ -457,7 +457,7 @@ def topic_readers(
             carriers = channels.setdefault(channel.topic, [])
             carriers.append(FileChannel(container, channel, schema, log))
     for topic, carriers in channels.items():
-        # Messages of another kind on a topic of images are no images that are lost.
+        # Messages of another kind on a topic of images are not images that are lost.
         images = [c for c in carriers if pictures.kind_of(c.channel, c.schema) in PICTURES]
         if any(source.schema and source.log.count for source in images):
             channels[topic] = images

@@ -120,7 +120,7 @@ def _parse(file: Path) -> Any:
         reason = str(error)
         if isinstance(error, ParseError):
             line, column = error.position
-            reason = f"it is no XML, or ends early (line {line}, column {column + 1})"
+            reason = f"it is not XML, or ends early (line {line}, column {column + 1})"
         elif isinstance(error, UnicodeDecodeError):
             reason = "it is not in UTF-8"
         raise LogError(f"cannot be read as labels: {reason}", where=file) from error
@@ -235,8 +235,8 @@ def npy_picture(data: bytes, limits: Limits) -> RawPicture:
     """Return the ``(H, W)`` array of an NPY file as a picture of one channel.
 
     Truth values and whole numbers keep their values, numbers with a fraction become float32. No
-    code in the file runs: an array of objects is refused. A `BadMessage` if it is no NPY file, is
-    cut off, or holds something else. An `ImageError` if it is larger than the limits allow.
+    code in the file runs: an array of objects is refused. A `BadMessage` if it is not an NPY file,
+    is cut off, or holds something else. An `ImageError` if it is larger than the limits allow.
     """
     try:
         array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)

@@ -49,7 +49,7 @@ class Outline(NamedTuple):
     """``x, y, x, y, ...`` in pixels."""
 
     def fill(self, size: Size) -> Mask:
-        """Return the ``(H, W)`` pixels of the area; a `BadMessage` if it is no outline."""
+        """Return the ``(H, W)`` pixels of the area; a `BadMessage` if it is not an outline."""
         points = self.points()
         filled = np.zeros(size[::-1], np.bool_)
         # The part of the image around it: from the first pixel to before the last.
@@ -76,7 +76,7 @@ class Outline(NamedTuple):
         except (TypeError, ValueError, OverflowError):
             ring = np.array(np.nan)
         if ring.ndim != 1 or not ring.size or len(ring) % 2 or not (np.abs(ring) <= 1e6).all():
-            raise BadMessage(f"an outline of {self.label} whose points are no pixels")
+            raise BadMessage(f"an outline of {self.label} whose points are not pixels")
         return ring.reshape(-1, 2) - 0.5
 
     def rotate(self, degrees: float, about: tuple[float, float]) -> Outline:

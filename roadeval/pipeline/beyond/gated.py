@@ -292,7 +292,7 @@ def _sigmoid(values: Any) -> Any:
 
 
 def gains(seen: GatedView, shaded: Values) -> Values:
-    """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
+    """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 changes nothing.
 
     It is ``(L / S)^p``: L is the mean colour of lit road, S the colour of the pixel, and p the
     probability that it is road in the shade, 0 except at candidates. For such road, L / S is the

@@ -126,7 +126,7 @@ def ndi(saturation: Floats, value: Floats) -> Floats:
     """Compute the normalised difference index ``(S - V) / (S + V)`` in -1..1 (Eq. 6, section 3.2).
 
     The printed ``S - V / S - V`` lacks its brackets and a sign. ``S + V`` is 0 only for pure black,
-    which gets -1 like every other grey, so that the border of a rectified image is no shadow.
+    which gets -1 like every other grey, so that the border of a rectified image is not a shadow.
     """
     total = saturation + value
     return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)

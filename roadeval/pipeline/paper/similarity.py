@@ -79,7 +79,7 @@ def whitening(covariance: Floats) -> Floats:
 def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
     """Return phase 1 as a pure function of a view (Eq. 2).
 
-    ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
+    ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is not a distance
     (its brackets are misplaced).
     """
     factors, greatest = whitening(road.covariance + RIDGE * np.eye(3)), limit(settings.quantile)

@@ -198,7 +198,7 @@ def test_a_file_that_ends_early_is_refused_alone_or_beside_another(tmp_path, nam
     content = (LABELS / name).read_text()
     path = written(tmp_path / "truth", f"b.{name[-4:]}", content[: int(share * len(content))])
     for place in (path, path.parent):
-        with pytest.raises(LogError, match=r"it is no (JSON|XML), or ends early \(line \d+, col"):
+        with pytest.raises(LogError, match=r"it is not (JSON|XML), or ends early \(line \d+, col"):
             labels_in(place, SIZE)
         shutil.copy(LABELS / name, path.with_name(f"a.{name[-4:]}"))
 
@@ -258,7 +258,7 @@ WRONG = {
     "runs that are too long": coco({"counts": [10, 48 * 32], "size": [32, 48]}),
     "negative runs": coco({"counts": [-10, 48 * 32 + 10], "size": [32, 48]}),
     "runs that add up by overflow": coco({"counts": [2**63 - 1, 2**63 - 1, 48 * 32 + 2]}),
-    "a text that is no runs": coco({"counts": "~~~"}),
+    "a text that is not runs": coco({"counts": "~~~"}),
     "a text that never ends": coco({"counts": "o" * 300_000}),
     "a text of other letters": coco({"counts": "\u20ac!"}),
     "a huge image": coco(SQUARE, width=10**9, height=10**9),
@@ -294,7 +294,7 @@ def test_what_cannot_be_drawn_loses_its_frame_alone(drive, tmp_path):
     content["images"][3]["width"] = 10**9
     run, summary = replay(drive, written(tmp_path / "t", "a.json", content), "--road-label", "road")
     assert run.returncode == 3
-    assert "frame 0: frame_0000.png: an outline of road whose points are no pixels" in run.stderr
+    assert "frame 0: frame_0000.png: an outline of road whose points are not pixels" in run.stderr
     assert "frame 3: frame_0003.png: an image of 1000000000x32, more than" in run.stderr
     assert summary["frames"]["evaluated"] == 1
 

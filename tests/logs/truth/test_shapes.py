@@ -217,7 +217,7 @@ def test_curves_of_bdd100k_are_cubic(tmp_path, types):
 def test_a_curve_without_a_place_costs_its_image(tmp_path):
     part = {"category": "road", "poly2d": [{"vertices": [None], "types": "LCCL", "closed": True}]}
     lost = one(tmp_path, "a.json", [{"name": "1.png", "labels": [part]}])
-    assert lost == "an outline of road whose points are no pixels"
+    assert lost == "an outline of road whose points are not pixels"
 
 
 @pytest.mark.parametrize(("what", "listed"), [("image", "images"), ("category", "categories")])
@@ -246,7 +246,7 @@ def test_a_damaged_file_costs_its_image_where_each_file_has_one(tmp_path):
     path.write_text(path.read_text()[:-9])
     settings = MaskSettings(str(path.parent), labels=LabelSettings(("road",)))
     truths, _ = labels_of(path.parent, settings)
-    assert truths.pop("2.json").startswith("cannot be read as labels: it is no JSON, or ends early")
+    assert truths.pop("2.json").startswith("cannot be read as labels: it is not JSON, or ends")
     assert [(label == "road").sum() for label in truths.values()] == [100, 100]
 
 

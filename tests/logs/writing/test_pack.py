@@ -111,7 +111,7 @@ def test_what_cannot_be_packed_is_refused(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"no image", "a.png: 8 bytes that are no image of a known format"),
+        (b"no image", "a.png: 8 bytes that are not an image of a known format"),
         (b"", "a.png: 0 bytes"),
         (png(grey(9))[:20], "a.png: a damaged PNG"),
     ],

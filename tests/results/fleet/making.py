@@ -28,7 +28,7 @@ LEVELS = {"similarity": 1.6, "svm": 1.3, "post": 1.0}
 """A stage's ERR in that of the final mask."""
 REGIONS = ("shadow", "lit", "boundary")
 PIXELS = 10_000
-REASONS = ("{}: no image topic; the log has: no topics at all", "{}: is no MCAP file")
+REASONS = ("{}: no image topic; the log has: no topics at all", "{}: is not an MCAP file")
 CAMERA = "/camera/image"
 RUN = {
     "preset": "paper",

@@ -117,7 +117,7 @@ def read_json(data: Buffer) -> Any:
     message = json.loads(bytes(data), object_hook=lambda fields: SimpleNamespace(**fields))
     if isinstance(content := getattr(message, "data", None), str):
         message.data = base64.b64decode(content, validate=True)
-    elif hasattr(message, "data"):  # else it is no image
+    elif hasattr(message, "data"):  # else it is not an image
         message.data = bytes([*message.data])  # an error for a number: bytes(5) is five zeros
     return message
 
