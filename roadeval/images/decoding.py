@@ -65,12 +65,13 @@ def deep_samples(data: File, limits: Limits) -> Array | None:
 def _deep_colours(data: File) -> Array | None:
     """Return the ``(H, W, 3)`` colours of a PNG of 16 bits; Pillow would keep eight.
 
-    None for any other file. An `ImageError` if it is damaged.
+    Grey with opacity fills all three. None for any other file. An `ImageError` if it is damaged.
     """
     import cv2
 
-    # The bits of a sample, and the kind: colours without and with opacity.
-    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in (b"\x10\2", b"\x10\6"):
+    # The bits of a sample, and the kind: colours, grey with opacity, colours with opacity.
+    kinds = b"\x10\2", b"\x10\4", b"\x10\6"
+    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in kinds:
         return None
     colours: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if colours is None:
@@ -83,9 +84,32 @@ def to_labels(data: File, limits: Limits) -> Array:
 
     A file with a palette gives its indices, or its greys if no entry has a colour. Three equal
     channels count as one. An image of a single colour that is transparent in parts gives its
-    opacity. Errors as in `to_rgb`, and if one of several colours is transparent in parts.
+    opacity. Errors as in `to_rgb`, and if one of several colours is transparent in parts, or the
+    file can be read in two ways.
     """
-    return upright(_label_values(_decode(data, limits), data), _left_to_turn(data, limits))
+    image = _decode(data, limits)
+    if not isinstance(image, np.ndarray) and image.format == "TIFF":
+        _check_tiff(image, data)
+    return upright(_label_values(image, data), _left_to_turn(data, limits))
+
+
+_REDUCED_OR_OPACITY: Final = 1 | 4
+"""Bits of a TIFF page's kind: an image made smaller, as a preview has it, or an opacity."""
+
+
+def _check_tiff(image: Any, data: File) -> None:
+    """Raise an `ImageError` if a label in a TIFF file can be read in two ways."""
+    tags = image.tag_v2
+    if image.mode == "1" and tags.get(262) == 0 and str(tags.get(305)).startswith("tifffile"):
+        raise ImageError(
+            "a TIFF of one bit a pixel by tifffile, which writes True as black: save the mask with "
+            "8 bits, as uint8"
+        )
+    with _damage_in(_known_format(data)), _opened(data, _known_format(data)) as pages:
+        for place in range(1, pages.n_frames):
+            pages.seek(place)
+            if not pages.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
+                raise ImageError("a TIFF of several images: save each label in a file of its own")
 
 
 def _label_values(image: Any, data: File) -> Array:
@@ -111,7 +135,31 @@ def _label_values(image: Any, data: File) -> Array:
                 "a label image with one colour that is transparent in parts: save it without "
                 "transparency"
             )
-    return without_colours(colours)
+    deep = _deep_labels(image, data)
+    return without_colours(colours) if deep is None else deep
+
+
+def _deep_labels(image: Any, data: File) -> Array | None:
+    """Return the ``(H, W)`` numbers of three equal channels of 16 bits.
+
+    None if eight bits hold them. An `ImageError` if the channels differ.
+    """
+    import cv2
+
+    deep: Any = _deep_colours(data)
+    if image.format == "TIFF" and max(image.tag_v2.get(258, (8,))) > 8:
+        deep = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if deep is None or deep.ndim != 3 or deep.dtype.itemsize < 2:
+            raise ImageError("a TIFF with colours of more than 8 bits: save the labels with 8 bits")
+    if deep is None:
+        return None
+    low, high = deep & 255, deep >> 8
+    if not low.any() or np.array_equal(low, high):
+        return None
+    grey = without_colours(deep)
+    if grey.ndim != 2:
+        raise ImageError("a label image with colours that need 16 bits: save it with 8 bits")
+    return grey
 
 
 def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
@@ -184,7 +232,8 @@ ORIENTATIONS: Final = {
 """How an image is turned, by EXIF's number: whether rows and columns are exchanged, then whether
 the rows, and the columns, run backwards."""
 _MARK_OF_JPEG: Final = b"Exif\0\0"
-_MARKS: Final = (_MARK_OF_JPEG, b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
+_MARKS_OF_TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_MARKS: Final = (_MARK_OF_JPEG, b"eXIf", b"EXIF", b"irot", b"imir", *_MARKS_OF_TIFF)
 """Every file with an orientation contains one of these, a JPEG the first."""
 
 
@@ -286,6 +335,9 @@ def _damage_in(format_: ImageFormat) -> Iterator[None]:
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
+        if format_.plugin == "Tiff" and "unknown pixel mode" in reason:
+            problem = "a TIFF of numbers that are not read, as of 64 bits: save them with 16 bits"
+            raise ImageError(problem) from error
         raise ImageError(f"a damaged {format_.name} ({reason})") from error
 
 
