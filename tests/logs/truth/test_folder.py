@@ -491,6 +491,9 @@ def test_names_of_the_camera_itself_are_taken(names, topic, frame_id):
         ("{}_drivable.png", "{}.jpg"),
         ("frame_{}_jpg.rf." + "0a" * 16 + ".jpg", "frame_{}.jpg"),
         ("0a1b2c3d-frame_{}.png", "frame_{}.jpg"),
+        # macOS writes the dots of an umlaut as a letter of their own.
+        ("Bru\u0308cke {}_mask.png", "Br\u00fccke {}.jpg"),
+        ("Br\u00fccke {}.png", "Bru\u0308cke {}.jpg"),
     ],
 )
 def test_what_all_labels_have_around_the_name_of_the_image_is_no_part_of_it(label, image):
