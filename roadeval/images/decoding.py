@@ -170,6 +170,25 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
     return np.array(image)
 
 
+def palette_of(data: File) -> npt.NDArray[np.uint8] | None:
+    """Return the ``(n, 3)`` colours of the values that `to_labels` gives of a PNG with a palette.
+
+    These are those of its indices, or 256 greys if no entry has a colour. None for another file.
+    """
+    format_, place = format_of(data), 8  # behind the mark of a PNG
+    if format_ is None or format_.name != "PNG" or bytes(data[25:26]) != b"\3":
+        return None
+    while place + 8 <= len(data) and (kind := bytes(data[place + 4 : place + 8])) != b"IDAT":
+        length = int.from_bytes(data[place : place + 4], "big")
+        if kind == b"PLTE":
+            content = data[place + 8 : place + 8 + length // 3 * 3]
+            colours = np.frombuffer(content, np.uint8).reshape(-1, 3)
+            greys = np.repeat(np.arange(256, dtype=np.uint8), 3).reshape(-1, 3)
+            return greys if (colours == colours[:, :1]).all() else colours
+        place += 12 + length
+    return None
+
+
 def without_colours(image: Rgb) -> Array:
     """Return one channel of an image if its three channels are equal, else the image."""
     grey = image[..., 0]

@@ -197,6 +197,13 @@ def label_samples(picture: Picture, limits: Limits) -> Array:
     return without_colours(to_rgb(picture, limits))
 
 
+def palette_of(picture: Picture) -> npt.NDArray[np.uint8] | None:
+    """Return the ``(n, 3)`` colours of the values of a PNG with a palette; None for others."""
+    if isinstance(picture, RawPicture) or (file := _file_in(picture)) is None:
+        return None
+    return decoding.palette_of(file)
+
+
 def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
     """Return width and height by a picture's head; None for video. A `BadMessage` if damaged."""
     if isinstance(picture, RawPicture):

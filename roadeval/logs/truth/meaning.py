@@ -40,6 +40,7 @@ from roadeval.logs.messages.pixels import (
     ROUNDING,
     label_samples,
     lossy_format,
+    palette_of,
     size_of,
     to_labels,
     to_rgb,
@@ -78,6 +79,9 @@ TWO_KINDS: Final = Sentence(
 )
 NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
+)
+NAME_COLOURS: Final = Sentence(
+    "name the colours that mean road with {labels.road_colors}, or save labels without a palette"
 )
 LONG: Final = 80
 """Greatest number of letters of a class's name in results."""
@@ -142,6 +146,8 @@ class ClassMap:
     """None for plain masks, which have no classes."""
     shows_road: bool = True
     """Whether road occurred in plain masks; if not, its value is a guess."""
+    colours: Mapping[int, int] = field(default_factory=dict)
+    """The packed colours that palettes give to values."""
 
     @property
     def classes(self) -> list[TruthClass]:
@@ -180,6 +186,13 @@ class ClassMap:
         values = to_labels(picture, limits)
         if values.ndim != 2:
             raise BadMessage("it holds colours, not label values")
+        if self.colours and values.dtype == np.uint8:
+            used = np.bincount(values.ravel()).nonzero()[0].tolist()
+            for value, colour in palette_colours(picture, used).items():
+                if (other := self.colours.get(value, colour)) != colour:
+                    problem = "its palette has the colour {} for {}, and others have {}"
+                    words = problem.format(_color_name(colour), value, _color_name(other))
+                    raise BadMessage(words, remedy=NAME_COLOURS)
         return Labels(self.of_values(values), self.codes.of(values) if self.codes else None)
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
@@ -284,10 +297,47 @@ def count_values(
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
 
+def palette_colours(picture: Picture, values: Collection[int]) -> dict[int, int]:
+    """Return the packed colours that a picture's palette, if it has one, gives to some values."""
+    if (palette := palette_of(picture)) is None:
+        return {}
+    colours = pack_colors(palette).tolist()
+    return {value: colours[value] for value in values if 0 <= value < len(colours)}
+
+
 _REPAIR: Final = (
     'import cv2, pathlib, sys; [cv2.imwrite(f"png/{f.stem}.png", cv2.threshold(cv2.imread(str(f), '
     '0), 127, 255, 0)[1]) for f in pathlib.Path(sys.argv[1]).rglob("*%s")]'
 )
+
+
+def merge_colours(palettes: Mapping[str, Mapping[int, int]]) -> dict[int, int]:
+    """Return the packed colours of values, given those of each label with a palette by its place.
+
+    A `LogError` if a value has two: then values mean nothing by themselves.
+    """
+    colours: dict[int, int] = {}
+    for place, palette in palettes.items():
+        for value, colour in palette.items():
+            if (other := colours.setdefault(value, colour)) != colour:
+                problem = "its palette has the colour {} for {}, and that of another label has {}"
+                words = problem.format(_color_name(colour), value, _color_name(other))
+                raise LogError(words, where=place, remedy=NAME_COLOURS)
+    return colours
+
+
+def check_brightness(
+    meaning: ClassMap, colours: Mapping[int, int], name: str, *, is_named: bool
+) -> None:
+    """Raise a `LogError` if road is not named, and its colour is darker than that of non-road."""
+    road = next((value for value, truth in meaning.meaning.items() if truth == ROAD), 0)
+    if is_named or not {0, road} <= colours.keys():
+        return
+    light = {value: sum(colours[value].to_bytes(3, "big")) for value in (0, road)}
+    if light[road] < light[0]:
+        problem = "{} holds the values 0 and {} of a palette, which are the colours {} and {}"
+        shown = _color_name(colours[0]), _color_name(colours[road])
+        raise UnclearLabelsError(problem.format(name, road, *shown), remedy=NAME_COLOURS)
 
 
 def find_meaning(
@@ -646,6 +696,7 @@ def meaning_of(
     stated = settings.labels.with_values(labels.name, names, origin.classes)
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []
+    palettes: dict[str, Mapping[int, int]] = {}
     problem, notes = "", tuple[str, ...]()
     for position, picture in samples(labels):
         file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
@@ -655,6 +706,7 @@ def meaning_of(
                 notes = check_size(size, labels, position, camera, pairing) or notes
             if confidence is None:
                 values = count_values(picture, stated, labels.name, labels.limits, file)
+                palettes[labels.place(position)] = palette_colours(picture, values)
             else:
                 values = {int(confidence.codes(picture, labels.limits).max()): 1}
             counts.append(values)
@@ -669,6 +721,9 @@ def meaning_of(
         meaning = find_class_meaning(stated, origin, labels.name)
     else:
         meaning = find_meaning(stated, counts, labels.name, shown)
+        colours = {} if meaning.by_color else merge_colours(palettes)
+        check_brightness(meaning, colours, labels.name, is_named=bool(stated.road))
+        meaning = replace(meaning, colours=colours)
     meaning = replace(meaning, notes=(*meaning.notes, *notes))
     pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()
