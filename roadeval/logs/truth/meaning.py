@@ -68,6 +68,8 @@ UNKNOWN: Final = 254
 """Stands for the truth of a value with unknown meaning."""
 TOP: Final = np.iinfo(np.uint16).max
 """The code of a confidence of 1."""
+SCALES: Final = frozenset({100 * (TOP // 255), 255, 1000, 1023, 4095, 10_000, 32_767})
+"""Codes of percent in 8 bits, and of other numbers in 16 bits that may mean a confidence of 1."""
 LEAST: Final = np.iinfo(np.int16).min
 """The least label value; values below count as this one."""
 NO_LABEL: Final = "values below 0 mean no label, and are ignored"
@@ -240,6 +242,15 @@ class Confidence:
         if greatest in (1, TOP // 255):  # 1 of 65535, or of 255
             problem = f"the greatest number of {name} is 1: these are masks, and no confidences"
             raise LogError(problem, remedy="leave out the threshold, or write fractions")
+
+    def doubts(self, greatest: int) -> tuple[str, ...]:
+        """Return a warning if the greatest code of some maps tells that 1 has another code."""
+        if greatest not in SCALES and greatest >= self.threshold * TOP:
+            return ()
+        share = f"the greatest confidence that was looked at is {greatest / TOP:.2g}"
+        return (
+            f"{share}: 255 means 1 in 8 bits, and 65535 in 16 bits; scale percent, for example",
+        )
 
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
@@ -715,8 +726,9 @@ def meaning_of(
     if not counts:
         raise undecodable(labels, problem)
     if confidence is not None:
-        confidence.check(max(map(max, counts)), labels.name)
-        return replace(confidence, notes=notes)
+        greatest = max(map(max, counts))
+        confidence.check(greatest, labels.name)
+        return replace(confidence, notes=(*notes, *confidence.doubts(greatest)))
     if origin.occurring:
         meaning = find_class_meaning(stated, origin, labels.name)
     else:
