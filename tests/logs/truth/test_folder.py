@@ -138,7 +138,7 @@ def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
     [
         ((), {}, "no image in it"),
         (("road.png",), {}, "road.png: its name has no number"),
-        (("1.png", "01.npy"), {}, "1.png belong to the same frame, by number"),
+        (("1.png", "01.npy"), {}, "1.png belong to the same frame, by number; choose one"),
         (("1.png",), {"pair": "stamp"}, "1.png: its name is not a time"),
     ],
 )

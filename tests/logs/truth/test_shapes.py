@@ -208,6 +208,15 @@ def test_a_bitmask_of_another_size_is_not_put_into_the_corner(tmp_path):
     assert truths["1.png"] == "a mask of road for an image of another size"
 
 
+def test_a_task_of_several_images_is_that_of_its_first_or_costs_it(tmp_path):
+    pages = {"note": "a", "pages": ["https://x/1.png", "https://x/2.png"]}
+    label = one(tmp_path, "a.json", [task(POLYGON | {"item_index": 0}, data=pages)])
+    np.testing.assert_array_equal(label == "road", inside(SQUARE))
+    other = task(POLYGON, data={"image": "3.png"})
+    truths, _ = read(tmp_path, "a.json", [task(POLYGON | {"item_index": 1}, data=pages), other])
+    assert truths["1.png"] == "a region of road on a further image of the same task"
+
+
 def test_an_address_without_an_ending_names_its_image(tmp_path):
     content = [task(POLYGON, data={"image": "https://x/0007", "by": "a.png"})]
     assert [*read(tmp_path, "a.json", content)[0]] == ["0007"]

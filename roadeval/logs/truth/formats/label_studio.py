@@ -72,7 +72,11 @@ def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str:
     """Return the name of a task's image, from the field that the regions refer to if possible."""
     data = task.get("data", task)
-    texts = {name: text for name, text in data.items() if isinstance(text, str)}
+    # A list has the pages of a task; regions on the first one have no index, or 0.
+    fields = {
+        name: [*text, ""][0] if isinstance(text, list) else text for name, text in data.items()
+    }
+    texts = {name: text for name, text in fields.items() if isinstance(text, str)}
     referred = [texts[name] for r in regions if (name := r.get("to_name")) in texts]
     files = [text for text in texts.values() if re.search(r"\.[a-zA-Z]\w{2,3}($|\?)", text)]
     others = [text for text in texts.values() if "/" in text]
@@ -119,6 +123,8 @@ def _shape(region: Mapping[str, Any], size: shapes.Size | None) -> shapes.Shape:
             f"a region of {' and '.join(map(str, labels)) or 'no class'}: give it one class"
         )
     (label,) = labels
+    if region.get("item_index"):
+        raise BadMessage(f"a region of {label} on a further image of the same task")
     if size is None or region.get("image_rotation"):
         raise BadMessage(f"a region of {label} on an image that was turned, or of unknown size")
     across, down = size[0] / 100, size[1] / 100
