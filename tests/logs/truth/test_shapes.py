@@ -116,6 +116,7 @@ SAME = {
     "Scalabel, runs": ("a.json", [{"name": "1.png", "labels": [{"category": "road", "rle": {
         "counts": [10 * 32 + 10, *[10, 22] * 9, 10, 12 + 28 * 32], "size": [32, 48]}}]}]),
     "COCO, one list": ("a.json", coco([n for point in SQUARE for n in point])),
+    "COCO, a list of points": ("a.json", coco(SQUARE)),
     "COCO without a size": ("a.json", coco([[n for p in SQUARE for n in p]], width=None)),
     "CVAT without a size": ("a.xml", image_xml(
         '<polygon label="road" points="10,10;20,10;20,20;10,20"/>', size="")),
