@@ -87,28 +87,30 @@ def to_labels(data: File, limits: Limits) -> Array:
     opacity. Errors as in `to_rgb`, and if one of several colours is transparent in parts, or the
     file can be read in two ways.
     """
-    image = _decode(data, limits)
-    if not isinstance(image, np.ndarray) and image.format == "TIFF":
-        _check_tiff(image, data)
-    return upright(_label_values(image, data), _left_to_turn(data, limits))
+    if _known_format(data).plugin == "Tiff":
+        _check_tiff(data)
+    return upright(_label_values(_decode(data, limits), data), _left_to_turn(data, limits))
 
 
 _REDUCED_OR_OPACITY: Final = 1 | 4
 """Bits of a TIFF page's kind: an image made smaller, as a preview has it, or an opacity."""
 
 
-def _check_tiff(image: Any, data: File) -> None:
-    """Raise an `ImageError` if a label in a TIFF file can be read in two ways."""
-    tags = image.tag_v2
-    if image.mode == "1" and tags.get(262) == 0 and str(tags.get(305)).startswith("tifffile"):
-        raise ImageError(
-            "a TIFF of one bit a pixel by tifffile, which writes True as black: save the mask with "
-            "8 bits, as uint8"
-        )
-    with _damage_in(_known_format(data)), _opened(data, _known_format(data)) as pages:
-        for place in range(1, pages.n_frames):
-            pages.seek(place)
-            if not pages.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
+def _check_tiff(data: File) -> None:
+    """Raise an `ImageError` if a label in a TIFF file can be read in two ways, by its head."""
+    format_ = _known_format(data)
+    with _damage_in(format_), _opened(data, format_) as image:
+        tags = image.tag_v2
+        if image.mode == "1" and tags.get(262) == 0 and str(tags.get(305)).startswith("tifffile"):
+            raise ImageError(
+                "a TIFF of one bit a pixel by tifffile, which writes True as black: save the mask "
+                "with 8 bits, as uint8"
+            )
+        if (bands := tags.get(277, 1)) > len(image.getbands()):
+            raise ImageError(f"a TIFF of {bands} bands: save the labels as one band")
+        for place in range(1, image.n_frames):
+            image.seek(place)
+            if not image.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
                 raise ImageError("a TIFF of several images: save each label in a file of its own")
 
 
@@ -355,7 +357,9 @@ def _damage_in(format_: ImageFormat) -> Iterator[None]:
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         if format_.plugin == "Tiff" and "unknown pixel mode" in reason:
-            problem = "a TIFF of numbers that are not read, as of 64 bits: save them with 16 bits"
+            problem = (
+                "a TIFF of numbers that are not read, as 64 bits: save one band of 8 or 16 bits"
+            )
             raise ImageError(problem) from error
         raise ImageError(f"a damaged {format_.name} ({reason})") from error
 
