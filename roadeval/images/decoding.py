@@ -92,6 +92,21 @@ def to_labels(data: File, limits: Limits) -> Array:
     return upright(_label_values(_decode(data, limits), data), _left_to_turn(data, limits))
 
 
+_LOSSY_TIFF: Final = dict.fromkeys((6, 7), "JPEG") | {34712: "JPEG 2000", 50001: "WebP"}
+"""Compressions of TIFF, by their numbers, that may change values."""
+
+
+def lossy_format(data: File) -> str:
+    """Return the name of a file's format if that changes values, as JPEG does; else empty."""
+    if (format_ := format_of(data)) is None:
+        return ""
+    if format_.plugin == "Tiff":
+        with suppress(Exception), _opened(data, format_) as image:
+            name = _LOSSY_TIFF.get(image.tag_v2.get(259))
+            return f"TIFF of {name}" if name else ""
+    return "" if format_.exact else format_.name
+
+
 _REDUCED_OR_OPACITY: Final = 1 | 4
 """Bits of a TIFF page's kind: an image made smaller, as a preview has it, or an opacity."""
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.images import decoding, formats
+from roadeval.images import decoding
 from roadeval.images.decoding import eight_bits, whole_numbers, without_colours
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.container.records import Buffer
@@ -218,8 +218,7 @@ def lossy_format(picture: Picture) -> str:
         return ""
     if (file := _file_in(picture)) is None:
         return "video"
-    format_ = formats.format_of(file)
-    return "" if format_ is None or format_.exact else format_.name
+    return decoding.lossy_format(file)
 
 
 @contextmanager

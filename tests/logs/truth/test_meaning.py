@@ -230,6 +230,19 @@ def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelS
         find_meaning(labels, [[0, 255]], "/labels").read(picture, LIMITS)
 
 
+def test_a_tiff_is_refused_if_it_is_compressed_as_jpeg() -> None:
+    labels, pictures = LabelSettings(road=(255,)), []
+    for compression in ("jpeg", "tiff_deflate"):
+        file = io.BytesIO()
+        Image.fromarray(grey(255)).save(file, "tiff", compression=compression)
+        pictures.append(CompressedPicture(0, "tiff", file.getvalue()))
+    assert count_values(pictures[1], labels, "/labels", LIMITS) == {255: grey(255).size}
+    with pytest.raises(LogError, match=r"/labels is TIFF of JPEG, .*: log labels as PNG"):
+        count_values(pictures[0], labels, "/labels", LIMITS)
+    with pytest.raises(BadMessage, match="a TIFF of JPEG, whose compression changes label values"):
+        find_meaning(labels, [[0, 255]], "/labels").read(pictures[0], LIMITS)
+
+
 def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(tmp_path):
     mask = np.zeros((64, 64), np.uint8)
     mask[20:, 11:53] = 255
