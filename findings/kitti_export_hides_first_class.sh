@@ -24,6 +24,7 @@ python3 -m venv "$folder/venv"
   datumaro==1.13.12 numpy==2.4.6
 cd "$folder"
 "$folder/venv/bin/python" - 2>/dev/null <<'PYTHON'
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +64,7 @@ def imported(kind, classes):
 
 
 expected = {name: int(area.sum()) for name, area in visible.items()}
-print(f"drawn: {expected} of {HEIGHT * WIDTH} pixels")
+print(f"datumaro {version('datumaro')}, drawn: {expected} of {HEIGHT * WIDTH} pixels")
 for kind, classes in (
     ("cityscapes", ["road", "car"]),
     ("kitti_segmentation", ["road", "car"]),

@@ -25,6 +25,7 @@ python3 -m venv "$folder/venv"
   pyoxipng==9.1.1 pillow==13.0.0 opencv-python-headless==5.0.0.93 numpy==2.4.6
 "$folder/venv/bin/python" - <<'PYTHON'
 import io
+from importlib.metadata import version
 
 import cv2
 import numpy as np
@@ -71,6 +72,7 @@ def renumbered(words, labels, palette=None):
     return numbers
 
 
+print(", ".join(f"{name} {version(name)}" for name in ("pyoxipng", "pillow")))
 first = renumbered("with the sky, numbers before and after", frame, VOC)
 second = renumbered("without the sky", without_sky, VOC)
 assert first == {0: 0, 1: 3, 2: 2, 3: 1}

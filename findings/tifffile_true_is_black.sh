@@ -24,6 +24,8 @@ python3 -m venv "$folder/venv"
   tifffile==2026.3.3 imageio==2.38.1 pillow==13.0.0 opencv-python-headless==5.0.0.93 numpy==2.4.6
 cd "$folder"
 "$folder/venv/bin/python" - <<'PYTHON'
+from importlib.metadata import version
+
 import cv2
 import imageio.v3 as imageio
 import numpy as np
@@ -47,6 +49,8 @@ WRITERS = {
     "uint8.tif": lambda path: tifffile.imwrite(path, road.astype(np.uint8)),
     "imageio.png": lambda path: imageio.imwrite(path, road),
 }
+packages = ("tifffile", "imageio", "pillow", "opencv-python-headless")
+print(", ".join(f"{name} {version(name)}" for name in packages))
 print(f"{road.sum()} of {road.size} pixels are road")
 for path, write in WRITERS.items():
     write(path)

@@ -26,6 +26,7 @@ cd "$folder"
 "$folder/venv/bin/python" - 2>/dev/null <<'PYTHON'
 import json
 import math
+from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -89,6 +90,7 @@ def around(degrees):
     return tuple(map(round, (min(xs), min(ys), max(xs), max(ys))))
 
 
+print(f"label-studio-sdk {version('label-studio-sdk')}")
 unturned = (LEFT, TOP, LEFT + ACROSS, TOP + DOWN)
 for degrees in (0, 90, 30):
     places = exported(degrees)
