@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
+from itertools import count
 from typing import Any, Final
 
 import numpy as np
@@ -123,10 +124,13 @@ def _check_tiff(data: File) -> None:
             )
         if (bands := tags.get(277, 1)) > len(image.getbands()):
             raise ImageError(f"a TIFF of {bands} bands: save the labels as one band")
-        for place in range(1, image.n_frames):
-            image.seek(place)
-            if not image.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
-                raise ImageError("a TIFF of several images: save each label in a file of its own")
+        # Behind the last page, and at an opacity of one bit, Pillow raises one of these.
+        with suppress(EOFError, SyntaxError):
+            for place in count(1):
+                image.seek(place)
+                if not image.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
+                    what = "a TIFF of several images"
+                    raise ImageError(f"{what}: save each label in a file of its own")
 
 
 def _label_values(image: Any, data: File) -> Array:

@@ -172,7 +172,7 @@ MASK = np.array([[1, 0, 0, 1, 1], [1, 1, 0, 0, 0]], np.uint8)
 BANDS = np.stack([1 - MASK, MASK], axis=2)
 
 
-def test_a_large_tiff_and_one_with_a_preview_are_read() -> None:
+def test_a_large_tiff_and_one_with_a_preview_and_an_opacity_are_read() -> None:
     # BigTIFF has offsets of 64 bits.
     big = tiff(MASK, bigtiff=True, extratags=[(274, "H", 1, 3, True)])
     assert to_labels(big, LIMITS).tolist() == MASK.tolist()
@@ -181,6 +181,7 @@ def test_a_large_tiff_and_one_with_a_preview_are_read() -> None:
     with tifffile.TiffWriter(made) as writer:
         writer.write(MASK)
         writer.write(MASK[:, ::2], subfiletype=1)
+        writer.write(MASK > 0, subfiletype=4, photometric="mask")
     assert to_labels(made.getvalue(), LIMITS).tolist() == MASK.tolist()
 
 
