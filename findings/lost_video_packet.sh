@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A packet that is missing from a video is no error, and marks no picture as corrupt.
+# A packet that is missing from a video is not an error, and marks no picture as corrupt.
 #
 # Software: PyAV 18.1.0 (with the FFmpeg, libx264, libx265 and libvpx in its wheels).
 #

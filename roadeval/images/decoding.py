@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
+from itertools import count
 from typing import Any, Final
 
 import numpy as np
@@ -65,12 +66,13 @@ def deep_samples(data: File, limits: Limits) -> Array | None:
 def _deep_colours(data: File) -> Array | None:
     """Return the ``(H, W, 3)`` colours of a PNG of 16 bits; Pillow would keep eight.
 
-    None for any other file. An `ImageError` if it is damaged.
+    Grey with opacity fills all three. None for any other file. An `ImageError` if it is damaged.
     """
     import cv2
 
-    # These bytes are the bits of a sample and the kind: 2 without opacity, 6 with opacity.
-    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in (b"\x10\2", b"\x10\6"):
+    # The bits of a sample, and the kind: colours, grey with opacity, colours with opacity.
+    kinds = b"\x10\2", b"\x10\4", b"\x10\6"
+    if _known_format(data).name != "PNG" or bytes(data[24:26]) not in kinds:
         return None
     colours: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if colours is None:
@@ -83,9 +85,52 @@ def to_labels(data: File, limits: Limits) -> Array:
 
     A file with a palette gives its indices, or its greys if no entry has a colour. Three equal
     channels count as one. An image of a single colour that is transparent in parts gives its
-    opacity. An `ImageError` as in `to_rgb`, or if one of several colours is transparent in parts.
+    opacity. An `ImageError` as in `to_rgb`, or if one of several colours is transparent in parts,
+    or the file can be read in two ways.
     """
+    if _known_format(data).plugin == "Tiff":
+        _check_tiff(data)
     return upright(_label_values(_decode(data, limits), data), _remaining_turn(data, limits))
+
+
+_LOSSY_TIFF: Final = dict.fromkeys((6, 7), "JPEG") | {34712: "JPEG 2000", 50001: "WebP"}
+"""Compressions of TIFF, by their numbers, that may change values."""
+
+
+def lossy_format(data: File) -> str:
+    """Return the name of a file's format if that changes values, as JPEG does; else empty."""
+    if (format_ := format_of(data)) is None:
+        return ""
+    if format_.plugin == "Tiff":
+        with suppress(Exception), _pillow_image(data, format_) as image:
+            name = _LOSSY_TIFF.get(image.tag_v2.get(259))
+            return f"TIFF of {name}" if name else ""
+    return "" if format_.exact else format_.name
+
+
+_REDUCED_OR_OPACITY: Final = 1 | 4
+"""Bits of a TIFF page's kind: an image made smaller, as a preview has it, or an opacity."""
+
+
+def _check_tiff(data: File) -> None:
+    """Raise an `ImageError` if a label in a TIFF file can be read in two ways, by its head."""
+    format_ = _known_format(data)
+    with _damage_in(format_), _pillow_image(data, format_) as image:
+        tags = image.tag_v2
+        if image.mode == "1" and tags.get(262) == 0 and str(tags.get(305)).startswith("tifffile"):
+            raise ImageError(
+                "a TIFF of one bit a pixel by tifffile, which writes True as black: save the mask "
+                "with 8 bits, as uint8"
+            )
+        if (bands := tags.get(277, 1)) > len(image.getbands()):
+            raise ImageError(f"a TIFF of {bands} bands: save the labels as one band")
+        # Behind the last page, and at an opacity of one bit, Pillow raises one of these.
+        with suppress(EOFError, SyntaxError):
+            for place in count(1):
+                image.seek(place)
+                if not image.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
+                    what = "a TIFF of several images"
+                    raise ImageError(f"{what}: save each label in a file of its own")
 
 
 def _label_values(image: Any, data: File) -> Array:
@@ -111,7 +156,31 @@ def _label_values(image: Any, data: File) -> Array:
                 "a label image with one colour that is transparent in parts: save it without "
                 "transparency"
             )
-    return without_colours(colours)
+    deep = _deep_labels(image, data)
+    return without_colours(colours) if deep is None else deep
+
+
+def _deep_labels(image: Any, data: File) -> Array | None:
+    """Return the ``(H, W)`` numbers of three equal channels of 16 bits.
+
+    None if eight bits hold them. An `ImageError` if the channels differ.
+    """
+    import cv2
+
+    deep: Any = _deep_colours(data)
+    if image.format == "TIFF" and max(image.tag_v2.get(258, (8,))) > 8:
+        deep = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if deep is None or deep.ndim != 3 or deep.dtype.itemsize < 2:
+            raise ImageError("a TIFF with colours of more than 8 bits: save the labels with 8 bits")
+    if deep is None:
+        return None
+    low, high = deep & 255, deep >> 8
+    if not low.any() or np.array_equal(low, high):
+        return None
+    grey = without_colours(deep)
+    if grey.ndim != 2:
+        raise ImageError("a label image with colours that need 16 bits: save it with 8 bits")
+    return grey
 
 
 def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
@@ -120,6 +189,25 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
     if isinstance(image, np.ndarray) or image.mode != "P":
         raise ImageError("an image without a palette")
     return np.array(image)
+
+
+def palette_of(data: File) -> npt.NDArray[np.uint8] | None:
+    """Return the ``(n, 3)`` colours of the values that `to_labels` gives of a PNG with a palette.
+
+    These are those of its indices, or 256 greys if no entry has a colour. None for another file.
+    """
+    format_, place = format_of(data), 8  # behind the mark of a PNG
+    if format_ is None or format_.name != "PNG" or bytes(data[25:26]) != b"\3":
+        return None
+    while place + 8 <= len(data) and (kind := bytes(data[place + 4 : place + 8])) != b"IDAT":
+        length = int.from_bytes(data[place : place + 4], "big")
+        if kind == b"PLTE":
+            content = data[place + 8 : place + 8 + length // 3 * 3]
+            colours = np.frombuffer(content, np.uint8).reshape(-1, 3)
+            greys = np.repeat(np.arange(256, dtype=np.uint8), 3).reshape(-1, 3)
+            return greys if (colours == colours[:, :1]).all() else colours
+        place += 12 + length
+    return None
 
 
 def without_colours(image: Rgb) -> Array:
@@ -184,8 +272,9 @@ ORIENTATIONS: Final = {
 """The turn of an image by EXIF's number: whether rows and columns are exchanged, whether the rows
 then run backwards, and whether the columns do."""
 _MARK_OF_JPEG: Final = b"Exif\0\0"
-_MARKS: Final = (_MARK_OF_JPEG, b"eXIf", b"EXIF", b"irot", b"imir", b"II*\0", b"MM\0*")
-"""Every file with an orientation contains one of these marks, and a JPEG the first mark."""
+_MARKS_OF_TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_MARKS: Final = (_MARK_OF_JPEG, b"eXIf", b"EXIF", b"irot", b"imir", *_MARKS_OF_TIFF)
+"""Every file with an orientation contains one of these, a JPEG the first."""
 
 
 def upright(pixels: Array, orientation: int) -> Array:
@@ -286,6 +375,11 @@ def _damage_in(format_: ImageFormat) -> Iterator[None]:
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
+        if format_.plugin == "Tiff" and "unknown pixel mode" in reason:
+            problem = (
+                "a TIFF of numbers that are not read, as 64 bits: save one band of 8 or 16 bits"
+            )
+            raise ImageError(problem) from error
         raise ImageError(f"a damaged {format_.name} ({reason})") from error
 
 

@@ -69,6 +69,8 @@ FORMATS: Final = (
     ImageFormat("JPEG 2000", 4, b"jP  ", "Jpeg2K", exact=False),
     ImageFormat("TIFF", 0, b"II*\0", "Tiff"),
     ImageFormat("TIFF", 0, b"MM\0*", "Tiff"),
+    ImageFormat("TIFF", 0, b"II+\0", "Tiff"),
+    ImageFormat("TIFF", 0, b"MM\0+", "Tiff"),
     ImageFormat("BMP", 0, b"BM", "Bmp"),
     ImageFormat("PGM", 0, b"P5", "Ppm"),
     ImageFormat("PPM", 0, b"P6", "Ppm"),

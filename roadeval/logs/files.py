@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import unicodedata
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from itertools import takewhile
@@ -224,7 +225,8 @@ def prefer_ids(labels: Sequence[Path]) -> Sequence[Path]:
 
 def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, Path]:
     """Return each label's image by its name: unchanged, `bare_name`, or without shared ends."""
-    exact, loose = {file.stem: file for file in images}, {bare_name(file): file for file in images}
+    exact = {_composed(file.stem): file for file in images}
+    loose = {bare_name(file): file for file in images}
     names = without_hashes([*map(bare_name, labels)])
     ends = [len(part) for part in _shared([name[::-1] for name in names])]
     matches = (
@@ -234,7 +236,7 @@ def images_of(labels: Sequence[Path], images: Sequence[Path]) -> Mapping[Path, P
     )
     best = max(matches, key=lambda belong: len(belong) - belong.count(None), default=[])
     pairs = {
-        label: exact.get(label.stem) or exact.get(bare_name(label)) or image
+        label: exact.get(_composed(label.stem)) or exact.get(bare_name(label)) or image
         for label, image in zip(labels, best, strict=True)
     }
     return {label: image for label, image in pairs.items() if image is not None}
@@ -267,7 +269,7 @@ def match_name(pattern: str, name: str) -> re.Match[str] | None:
     kinds = {"*": ".*", "?": ".", NUMBER: r"(?<!\d)(\d+)"}
     parts = re.split(rf"([*?]|{re.escape(NUMBER)})", pattern)
     regex = "".join(kinds.get(part, re.escape(part)) for part in parts)
-    return re.fullmatch(regex, name, re.DOTALL)
+    return re.fullmatch(_composed(regex), _composed(name), re.DOTALL)
 
 
 def bare_name(file: Path) -> str:
@@ -276,7 +278,12 @@ def bare_name(file: Path) -> str:
     >>> bare_name(Path("um_road_000012.png")), bare_name(Path("a_000019_gtFine_labelIds.png"))
     ('um_000012', 'a_000019')
     """
-    return _SUFFIX.sub("", _KITTI.sub(r"\1_", file.stem))
+    return _SUFFIX.sub("", _KITTI.sub(r"\1_", _composed(file.stem)))
+
+
+def _composed(name: str) -> str:
+    """Return a name with each letter and its marks as one; macOS has them apart."""
+    return unicodedata.normalize("NFC", name)
 
 
 def times_alone(names: Sequence[str]) -> Sequence[str]:

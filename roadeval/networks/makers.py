@@ -101,20 +101,21 @@ def input_settings(folder: Path, content: bytes) -> NetSettings:
         problem = f"has {step}, after which the network does not see the frame as it is"
         raise NetworkError(problem, where=path, remedy=f"set {step} to false")
     values: dict[str, Any] = {"layout": "NCHW", "resize": "stretch"}
+    kind = str(made.get("image_processor_type", made.get("feature_extractor_type")))
     if made.get("do_resize", True):
         if (resample := made.get("resample", 2)) not in (2, 3):
             problem = f"asks for resample {resample!r}; only 2 and 3 are known"
             raise NetworkError(problem, where=path, remedy="set resample to 2, the bilinear filter")
         values["antialias"] = FILTERS[resample]
         size = made.get("size")
-        kind = made.get("image_processor_type", made.get("feature_extractor_type"))
         # Otherwise the size is not stated, or depends on the frame.
         if isinstance(size, dict) and {"width", "height"} <= size.keys():
             values["size"] = [size["width"], size["height"]]
-        elif isinstance(size, int) and "Segformer" in str(kind):
+        elif isinstance(size, int) and "Segformer" in kind:
             values["size"] = [size, size]
     values["scale"] = made.get("rescale_factor", 1 / 255) if made.get("do_rescale", True) else 1.0
-    if made.get("do_normalize", True):
+    # MobileViT's processor has a mean, and by default does not use it.
+    if made.get("do_normalize", "MobileViT" not in kind):
         for key, name in (("image_mean", "mean"), ("image_std", "deviation")):
             if key not in made:
                 raise NetworkError(f"lacks {key}", where=path, remedy="add it")

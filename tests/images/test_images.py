@@ -1,12 +1,15 @@
 """Image files to arrays; damage and size are told before anything else."""
 
 import io
+import struct
+import zlib
 from base64 import b85decode
 from contextlib import suppress
 
 import cv2
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 
 from roadeval.errors import SettingError
@@ -120,6 +123,95 @@ def test_a_pgm_keeps_its_numbers_whatever_its_greatest_is(greatest: int) -> None
     assert np.abs(image - 255 * (values / greatest)).max() <= 1
     deep = deep_samples(file, Limits())
     assert deep is None if greatest < 256 else deep.tolist() == values.tolist()
+
+
+def tiff(pixels, **options) -> bytes:
+    """Return a TIFF file by tifffile."""
+    made = io.BytesIO()
+    tifffile.imwrite(made, pixels, **options)
+    return made.getvalue()
+
+
+def grey_with_opacity(values: list[int]) -> bytes:
+    """Return a PNG of one row, of grey and opacity with 16 bits; no library here writes one."""
+    row = b"\0" + b"".join(struct.pack(">HH", value, 65535) for value in values)
+    head = struct.pack(">IIBBBBB", len(values), 1, 16, 4, 0, 0, 0)
+    parts = (b"IHDR", head), (b"IDAT", zlib.compress(row)), (b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in parts
+    )
+
+
+IDS = np.array([[0, 1, 7, 300]], np.uint16)
+THRICE = np.repeat(IDS[..., None], 3, axis=2)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        cv2.imencode(".png", THRICE)[1].tobytes(),
+        cv2.imencode(".png", np.dstack([THRICE, np.full_like(IDS, 65535)]))[1].tobytes(),
+        grey_with_opacity(IDS[0].tolist()),
+        tiff(THRICE, photometric="rgb"),
+    ],
+    ids=["PNG", "PNG with opacity", "PNG of grey with opacity", "TIFF"],
+)
+def test_labels_of_sixteen_bits_in_equal_channels_keep_their_numbers(data: bytes) -> None:
+    assert to_labels(data, LIMITS).tolist() == IDS.tolist()
+
+
+@pytest.mark.parametrize("factor", [256, 257])
+def test_labels_of_eight_bits_that_were_stored_in_sixteen_are_the_same(factor: int) -> None:
+    colours = np.array([[[0, 128, 255], [255, 255, 255]]], np.uint16)
+    data = cv2.imencode(".png", colours[..., ::-1] * factor)[1].tobytes()
+    assert to_labels(data, LIMITS).tolist() == colours.tolist()
+
+
+def test_colours_that_eight_bits_do_not_hold_are_no_labels() -> None:
+    data = cv2.imencode(".png", np.array([[[0, 1, 2], [2, 1, 0]]], np.uint16))[1].tobytes()
+    with pytest.raises(ImageError, match="colours that need 16 bits: save it with 8 bits"):
+        to_labels(data, LIMITS)
+
+
+MASK = np.array([[1, 0, 0, 1, 1], [1, 1, 0, 0, 0]], np.uint8)
+
+
+BANDS = np.stack([1 - MASK, MASK], axis=2)
+
+
+def test_a_large_tiff_and_one_with_a_preview_and_an_opacity_are_read() -> None:
+    # BigTIFF has offsets of 64 bits.
+    big = tiff(MASK, bigtiff=True, extratags=[(274, "H", 1, 3, True)])
+    assert to_labels(big, LIMITS).tolist() == MASK.tolist()
+    assert to_labels(big, Limits(turn=True)).tolist() == MASK[::-1, ::-1].tolist()
+    made = io.BytesIO()
+    with tifffile.TiffWriter(made) as writer:
+        writer.write(MASK)
+        writer.write(MASK[:, ::2], subfiletype=1)
+        writer.write(MASK > 0, subfiletype=4, photometric="mask")
+    assert to_labels(made.getvalue(), LIMITS).tolist() == MASK.tolist()
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (tiff(MASK > 0), "by tifffile, which writes True as black"),
+        (tiff(np.stack([MASK, 1 - MASK])), "a TIFF of several images"),
+        (tiff(MASK.astype(np.int64)), "numbers that are not read, as 64 bits"),
+        # Pillow 12 does not open it, and Pillow 13 has its first band.
+        (tiff(BANDS, photometric="minisblack", planarconfig="contig"), "(2 bands|are not read)"),
+    ],
+    ids=["truth values", "an image a class", "64 bits", "a band a class"],
+)
+def test_a_tiff_that_may_be_read_otherwise_is_refused_with_the_way_out(data, problem) -> None:
+    with pytest.raises(ImageError, match=f"{problem}.*: save "):
+        to_labels(data, LIMITS)
+
+
+def test_one_bit_whose_zero_is_white_is_read_as_it_looks() -> None:
+    data = tiff(MASK == 0, photometric="miniswhite", software="another")
+    assert to_labels(data, LIMITS).tolist() == (255 * MASK).tolist()
 
 
 TWELVE_BITS = b85decode(

@@ -359,6 +359,19 @@ STEPS = {
 }
 
 
+def test_mobilevit_does_not_normalise_unless_its_folder_asks_for_it(tmp_path):
+    """Its files have no ``do_normalize``, but those of transformers 5 have a mean."""
+    folder = folder_of(tmp_path, preprocessing={"image_processor_type": "MobileViTImageProcessor"})
+    path = folder / "preprocessor_config.json"
+    stated = json.loads(path.read_text())
+    assert opened(folder).settings.mean == (0.4, 0.5, 0.6)
+    for name in ("do_normalize", "image_mean", "image_std"):
+        del stated[name]
+        path.write_text(json.dumps(stated))
+        settings = opened(folder).settings
+        assert (settings.mean, settings.deviation) == ((0.0,), (1.0,))
+
+
 @pytest.mark.parametrize("what", STEPS)
 def test_steps_of_preprocessing_become_settings(what, tmp_path):
     changed, expected = STEPS[what]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.images import decoding, formats
+from roadeval.images import decoding
 from roadeval.images.decoding import eight_bits, whole_numbers, without_colours
 from roadeval.images.formats import ImageError, Limits
 from roadeval.logs.container.records import Buffer
@@ -197,6 +197,13 @@ def label_samples(picture: Picture, limits: Limits) -> Array:
     return without_colours(to_rgb(picture, limits))
 
 
+def palette_of(picture: Picture) -> npt.NDArray[np.uint8] | None:
+    """Return the ``(n, 3)`` colours of the values of a PNG with a palette; None for others."""
+    if isinstance(picture, RawPicture) or (file := _file_in(picture)) is None:
+        return None
+    return decoding.palette_of(file)
+
+
 def size_of(picture: Picture, limits: Limits) -> tuple[int, int] | None:
     """Return width and height by a picture's head; None for video. A `BadMessage` if damaged."""
     if isinstance(picture, RawPicture):
@@ -211,8 +218,7 @@ def lossy_format(picture: Picture) -> str:
         return ""
     if (file := _file_in(picture)) is None:
         return "video"
-    format_ = formats.format_of(file)
-    return "" if format_ is None or format_.exact else format_.name
+    return decoding.lossy_format(file)
 
 
 @contextmanager

@@ -115,7 +115,7 @@ def _parse(file: Path) -> Any:
                     raise ValueError("it defines entities, or is not in UTF-8")
                 return fromstring(content, XMLParser(encoding="utf-8"))
             case _:
-                return content.decode()
+                return content.decode("utf-8-sig")  # a byte order mark may come first
     except (ValueError, ParseError) as error:
         reason = str(error)
         if isinstance(error, ParseError):

@@ -40,6 +40,7 @@ from roadeval.logs.messages.pixels import (
     ROUNDING,
     label_samples,
     lossy_format,
+    palette_of,
     size_of,
     to_labels,
     to_rgb,
@@ -67,6 +68,8 @@ UNKNOWN: Final = 254
 """Stands for the truth of a value with unknown meaning."""
 TOP: Final = np.iinfo(np.uint16).max
 """The code of a confidence of 1."""
+SCALES: Final = frozenset({100 * (TOP // 255), 255, 1000, 1023, 4095, 10_000, 32_767})
+"""Codes of percent in 8 bits, and of other numbers in 16 bits that may mean a confidence of 1."""
 LEAST: Final = np.iinfo(np.int16).min
 """The least label value; values below count as this one."""
 NO_LABEL: Final = "values below 0 mean no label, and are ignored"
@@ -78,6 +81,9 @@ TWO_KINDS: Final = Sentence(
 )
 NAME_THEM: Final = Sentence(
     "name those that mean road with {labels.road}, and those to leave out with {labels.ignore}"
+)
+NAME_COLOURS: Final = Sentence(
+    "name the colours that mean road with {labels.road_colors}, or save labels without a palette"
 )
 LONG: Final = 80
 """Greatest number of letters of a class's name in results."""
@@ -142,6 +148,8 @@ class ClassMap:
     """None for plain masks, which have no classes."""
     shows_road: bool = True
     """Whether road occurred in plain masks; if not, its value is a guess."""
+    colours: Mapping[int, int] = field(default_factory=dict)
+    """The packed colours that palettes give to values."""
 
     @property
     def classes(self) -> list[TruthClass]:
@@ -180,6 +188,13 @@ class ClassMap:
         values = to_labels(picture, limits)
         if values.ndim != 2:
             raise BadMessage("it holds colours, not label values")
+        if self.colours and values.dtype == np.uint8:
+            used = np.bincount(values.ravel()).nonzero()[0].tolist()
+            for value, colour in palette_colours(picture, used).items():
+                if (other := self.colours.get(value, colour)) != colour:
+                    problem = "its palette has the colour {} for {}, and others have {}"
+                    words = problem.format(_color_name(colour), value, _color_name(other))
+                    raise BadMessage(words, remedy=NAME_COLOURS)
         return Labels(self.of_values(values), self.codes.of(values) if self.codes else None)
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
@@ -227,6 +242,15 @@ class Confidence:
         if greatest in (1, TOP // 255):  # 1 of 65535, or of 255
             problem = f"the greatest number of {name} is 1: these are masks, and no confidences"
             raise LogError(problem, remedy="leave out the threshold, or write fractions")
+
+    def doubts(self, greatest: int) -> tuple[str, ...]:
+        """Return a warning if the greatest code of some maps tells that 1 has another code."""
+        if greatest not in SCALES and greatest >= self.threshold * TOP:
+            return ()
+        share = f"the greatest confidence that was looked at is {greatest / TOP:.2g}"
+        return (
+            f"{share}: 255 means 1 in 8 bits, and 65535 in 16 bits; scale percent, for example",
+        )
 
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
@@ -284,10 +308,47 @@ def count_values(
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
 
+def palette_colours(picture: Picture, values: Collection[int]) -> dict[int, int]:
+    """Return the packed colours that a picture's palette, if it has one, gives to some values."""
+    if (palette := palette_of(picture)) is None:
+        return {}
+    colours = pack_colors(palette).tolist()
+    return {value: colours[value] for value in values if 0 <= value < len(colours)}
+
+
 _REPAIR: Final = (
     'import cv2, pathlib, sys; [cv2.imwrite(f"png/{f.stem}.png", cv2.threshold(cv2.imread(str(f), '
     '0), 127, 255, 0)[1]) for f in pathlib.Path(sys.argv[1]).rglob("*%s")]'
 )
+
+
+def merge_colours(palettes: Mapping[str, Mapping[int, int]]) -> dict[int, int]:
+    """Return the packed colours of values, given those of each label with a palette by its place.
+
+    A `LogError` if a value has two: then values mean nothing by themselves.
+    """
+    colours: dict[int, int] = {}
+    for place, palette in palettes.items():
+        for value, colour in palette.items():
+            if (other := colours.setdefault(value, colour)) != colour:
+                problem = "its palette has the colour {} for {}, and that of another label has {}"
+                words = problem.format(_color_name(colour), value, _color_name(other))
+                raise LogError(words, where=place, remedy=NAME_COLOURS)
+    return colours
+
+
+def check_brightness(
+    meaning: ClassMap, colours: Mapping[int, int], name: str, *, is_named: bool
+) -> None:
+    """Raise a `LogError` if road is not named, and its colour is darker than that of non-road."""
+    road = next((value for value, truth in meaning.meaning.items() if truth == ROAD), 0)
+    if is_named or not {0, road} <= colours.keys():
+        return
+    light = {value: sum(colours[value].to_bytes(3, "big")) for value in (0, road)}
+    if light[road] < light[0]:
+        problem = "{} holds the values 0 and {} of a palette, which are the colours {} and {}"
+        shown = _color_name(colours[0]), _color_name(colours[road])
+        raise UnclearLabelsError(problem.format(name, road, *shown), remedy=NAME_COLOURS)
 
 
 def find_meaning(
@@ -647,6 +708,7 @@ def meaning_of(
     stated = settings.labels.with_values(labels.name, names, origin.classes)
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     counts: list[Mapping[int, int]] = []
+    palettes: dict[str, Mapping[int, int]] = {}
     problem, notes = "", tuple[str, ...]()
     for position, picture in samples(labels):
         file = labels.labels[position].path if isinstance(labels, NamedLabels) else None
@@ -656,6 +718,7 @@ def meaning_of(
                 notes = check_size(size, labels, position, camera, pairing) or notes
             if confidence is None:
                 values = count_values(picture, stated, labels.name, labels.limits, file)
+                palettes[labels.place(position)] = palette_colours(picture, values)
             else:
                 values = {int(confidence.codes(picture, labels.limits).max()): 1}
             counts.append(values)
@@ -664,12 +727,16 @@ def meaning_of(
     if not counts:
         raise undecodable(labels, problem)
     if confidence is not None:
-        confidence.check(max(map(max, counts)), labels.name)
-        return replace(confidence, notes=notes)
+        greatest = max(map(max, counts))
+        confidence.check(greatest, labels.name)
+        return replace(confidence, notes=(*notes, *confidence.doubts(greatest)))
     if origin.occurring:
         meaning = find_class_meaning(stated, origin, labels.name)
     else:
         meaning = find_meaning(stated, counts, labels.name, shown)
+        colours = {} if meaning.by_color else merge_colours(palettes)
+        check_brightness(meaning, colours, labels.name, is_named=bool(stated.road))
+        meaning = replace(meaning, colours=colours)
     meaning = replace(meaning, notes=(*meaning.notes, *notes))
     pixels = sum(map(Counter, counts), Counter[int]())
     of_truth = Counter[int]()

@@ -170,7 +170,8 @@ def find_keys(
         if keys[one] == keys[other]:
             first, second = (one, other) if one.name == other.name else (one.name, other.name)
             both = f"{visible(str(first))} and {visible(str(second))}"
-            raise LogError(f"{both} belong to the same frame, by {by}", where=name)
+            remedy = Sentence("choose one kind by {truth.names}, as *_mask.png or masks/*")
+            raise LogError(f"{both} belong to the same frame, by {by}", where=name, remedy=remedy)
     rising = np.array([keys[label.path] for label in labels], np.int64)
     number = settings.first or 0
     if by == "number":

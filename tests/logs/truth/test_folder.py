@@ -23,7 +23,7 @@ from roadeval.logs.settings import LabelPlace, LogConfig, MaskSettings
 from roadeval.logs.topics.choose import check_names
 from roadeval.logs.topics.reader import TopicInfo
 from roadeval.logs.truth.label_files import labels_in, npy_picture
-from roadeval.logs.truth.meaning import Confidence, log_and_topic
+from roadeval.logs.truth.meaning import Confidence, log_and_topic, meaning_of
 from roadeval.logs.truth.named_labels import LabelSet, NamedLabel, NamedLabels, find_keys
 from roadeval.logs.truth.picks import Picked, Picks, Why
 from tests.fixtures import broken
@@ -138,7 +138,7 @@ def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
     [
         ((), {}, "no image in it"),
         (("road.png",), {}, "road.png: its name has no number"),
-        (("1.png", "01.npy"), {}, "1.png belong to the same frame, by number"),
+        (("1.png", "01.npy"), {}, "1.png belong to the same frame, by number; choose one"),
         (("1.png",), {"pair": "stamp"}, "1.png: its name is not a time"),
     ],
 )
@@ -205,6 +205,23 @@ def test_classes_that_are_stored_as_floats_keep_their_numbers(read):
     assert to_labels(read(fractions), Limits()).tolist() == [[0, 128, 255, 255]]
     assert Confidence(0.5).codes(read(fractions), Limits()).tolist() == [[0, 32768, 65535, 65535]]
     assert Confidence(0.5).codes(read(classes[:, :2]), Limits()).max() == 65535
+
+
+@pytest.mark.parametrize(
+    ("levels", "threshold", "is_told"),
+    [
+        (np.uint8([[0, 99]]), 0.5, True),
+        (np.uint8([[0, 99]]), 0.3, False),
+        (np.uint8([[0, 100]]), 0.3, True),
+        (np.uint8([[0, 200]]), 0.5, False),
+        (np.uint16([[0, 1000]]), 0.01, True),
+        (np.uint16([[0, 40_000]]), 0.5, False),
+    ],
+)
+def test_confidences_that_seem_to_have_another_scale_are_told(tmp_path, levels, threshold, is_told):
+    (tmp_path / "0.png").write_bytes(png(levels))
+    notes = meaning_of(opened(tmp_path), MaskSettings(str(tmp_path), threshold=threshold)).notes
+    assert any("255 means 1 in 8 bits" in note for note in notes) == is_told
 
 
 def test_rounding_takes_no_confidence_beyond_its_ends():
@@ -491,6 +508,9 @@ def test_names_of_the_camera_itself_are_taken(names, topic, frame_id):
         ("{}_drivable.png", "{}.jpg"),
         ("frame_{}_jpg.rf." + "0a" * 16 + ".jpg", "frame_{}.jpg"),
         ("0a1b2c3d-frame_{}.png", "frame_{}.jpg"),
+        # macOS writes the dots of an umlaut as a letter of their own.
+        ("Bru\u0308cke {}_mask.png", "Br\u00fccke {}.jpg"),
+        ("Br\u00fccke {}.png", "Bru\u0308cke {}.jpg"),
     ],
 )
 def test_what_all_labels_have_around_the_name_of_the_image_is_no_part_of_it(label, image):

@@ -239,6 +239,11 @@ def test_a_file_of_yolo_without_labels_is_an_image_without_a_shape(tmp_path, con
     assert notes == ("1 of 2 images have no shape, and count as not labelled",)
 
 
+def test_a_byte_order_mark_is_no_part_of_a_file_of_yolo(tmp_path):
+    content = "\ufeff0 .1 .1 .5 .1 .5 .5\r\n1 .1 .1 .2 .1 .2 .2\r\n"
+    assert dict(labels_in(written(tmp_path, "1.txt", content), SIZE).occurring) == {"0": 1, "1": 1}
+
+
 def coco(segmentation: Any, **image: Any) -> dict[str, Any]:
     return {
         "images": [{"id": 1, "file_name": "1.png", "width": 48, "height": 32} | image],

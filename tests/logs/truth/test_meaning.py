@@ -175,6 +175,52 @@ def test_a_palette_means_the_same_whichever_of_its_colours_an_image_has(palette,
         ]
 
 
+def meaning_of_palettes(folder, *pictures: CompressedPicture, **labels):
+    for number, picture in enumerate(pictures):
+        (folder / f"{number}.png").write_bytes(picture.data)
+    place = MaskSettings(str(folder), labels=LabelSettings(**labels))
+    origin = LabelSet(tuple(map(file_label, sorted(folder.iterdir()))))
+    return meaning_of(find_keys(origin, str(folder), place, LIMITS), place)
+
+
+BLACK = (0, 0, 0)
+MANY = palette_png([[0, 1, 2]], [*BLACK, *CAR, *ROAD])
+FEWER = palette_png([[0, 1, 1]], [*BLACK, *ROAD])
+"""As `MANY`, written without the colours that do not occur, as an optimiser of PNG files does."""
+
+
+def test_a_value_with_two_colours_is_refused_and_the_colours_are_read(tmp_path) -> None:
+    problem = "1.png: its palette has the colour 64,32,32 for 1, and that of another label has 204"
+    with pytest.raises(LogError, match=rf"{problem},0,255; name .*`labels.road_colors`"):
+        meaning_of_palettes(tmp_path, MANY, FEWER, road=(2,))
+    meaning = meaning_of_palettes(tmp_path, MANY, FEWER, road_colors=(ROAD,))
+    assert meaning.read(MANY, LIMITS).truth.tolist() == [[0, 0, 1]]
+    assert meaning.read(FEWER, LIMITS).truth.tolist() == [[0, 1, 1]]
+
+
+def test_a_label_with_another_palette_than_those_looked_at_is_no_label(tmp_path) -> None:
+    meaning = meaning_of_palettes(tmp_path, MANY, MANY, road=(2,))
+    assert meaning.read(MANY, LIMITS).truth.tolist() == [[0, 0, 1]]
+    with pytest.raises(BadMessage, match="its palette has the colour 64,32,32 for 1, and others"):
+        meaning.read(FEWER, LIMITS)
+
+
+def test_colours_that_do_not_occur_may_differ(tmp_path) -> None:
+    other = palette_png([[0, 1, 1]], [*BLACK, *CAR, *SKY])
+    meaning = meaning_of_palettes(tmp_path, MANY, other, road=(2,))
+    assert meaning.read(other, LIMITS).truth.tolist() == [[0, 0, 0]]
+
+
+def test_a_palette_whose_second_colour_is_darker_is_no_mask_of_0_and_1(tmp_path) -> None:
+    # Pillow sorts the colours of a quantised image so.
+    with pytest.raises(LogError, match=r"0 and 1 of a palette.* 64,32,32 and 0,0,0; name the"):
+        meaning_of_palettes(tmp_path, palette_png([[0, 1]], [*ROAD, *BLACK]))
+    named = meaning_of_palettes(tmp_path, palette_png([[0, 1]], [*ROAD, *BLACK]), road=(0,))
+    assert named.read(palette_png([[0, 1]], [*ROAD, *BLACK]), LIMITS).truth.tolist() == [[1, 0]]
+    meaning = meaning_of_palettes(tmp_path, FEWER)
+    assert meaning.read(FEWER, LIMITS).truth.tolist() == [[0, 1, 1]]
+
+
 @pytest.mark.parametrize("labels", [LabelSettings(), LabelSettings(road=(255,))])
 def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelSettings) -> None:
     picture = CompressedPicture(0, "jpeg", jpeg(grey(255)))
@@ -182,6 +228,19 @@ def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelS
         count_values(picture, labels, "/labels", LIMITS)
     with pytest.raises(BadMessage, match="a JPEG, whose compression changes label values"):
         find_meaning(labels, [[0, 255]], "/labels").read(picture, LIMITS)
+
+
+def test_a_tiff_is_refused_if_it_is_compressed_as_jpeg() -> None:
+    labels, pictures = LabelSettings(road=(255,)), []
+    for compression in ("jpeg", "tiff_deflate"):
+        file = io.BytesIO()
+        Image.fromarray(grey(255)).save(file, "tiff", compression=compression)
+        pictures.append(CompressedPicture(0, "tiff", file.getvalue()))
+    assert count_values(pictures[1], labels, "/labels", LIMITS) == {255: grey(255).size}
+    with pytest.raises(LogError, match=r"/labels is TIFF of JPEG, .*: log labels as PNG"):
+        count_values(pictures[0], labels, "/labels", LIMITS)
+    with pytest.raises(BadMessage, match="a TIFF of JPEG, whose compression changes label values"):
+        find_meaning(labels, [[0, 255]], "/labels").read(pictures[0], LIMITS)
 
 
 def test_masks_saved_as_jpeg_are_refused_with_a_command_that_mends_the_folder(tmp_path):

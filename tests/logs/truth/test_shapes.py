@@ -5,11 +5,13 @@ import json
 import math
 import random
 import re
+from base64 import b64encode
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from roadeval.images.decoding import png_of
 from roadeval.images.formats import Limits
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.settings import LabelSettings, MaskSettings
@@ -70,6 +72,18 @@ def region(**value):
     return {"value": {"polygonlabels": ["road"], **value}}
 
 
+def vector(*, curved=False, before=("p0", "p1", "p2"), **value):
+    """A vector of Label Studio round the square; ``before`` are the points before its others."""
+    vertices = [
+        {"id": f"p{n}", "x": x, "y": y, "prevPointId": (None, *before)[n], "isBezier": curved}
+        for n, (x, y) in enumerate(percent(SQUARE))
+    ]
+    return {
+        "type": "vectorlabels",
+        "value": {"vectorlabels": ["road"], "vertices": vertices} | value,
+    }
+
+
 POLYGON = region(points=percent(SQUARE))
 VIA = {
     "shape_attributes": {
@@ -102,6 +116,7 @@ SAME = {
     "Scalabel, runs": ("a.json", [{"name": "1.png", "labels": [{"category": "road", "rle": {
         "counts": [10 * 32 + 10, *[10, 22] * 9, 10, 12 + 28 * 32], "size": [32, 48]}}]}]),
     "COCO, one list": ("a.json", coco([n for point in SQUARE for n in point])),
+    "COCO, a list of points": ("a.json", coco(SQUARE)),
     "COCO without a size": ("a.json", coco([[n for p in SQUARE for n in p]], width=None)),
     "CVAT without a size": ("a.xml", image_xml(
         '<polygon label="road" points="10,10;20,10;20,20;10,20"/>', size="")),
@@ -126,6 +141,8 @@ SAME = {
     "Label Studio, two results": ("a.json", [task(
         {"id": "a", "type": "polygon", "value": {"points": percent(SQUARE), "closed": True}},
         {"id": "a", "type": "labels", "value": {"points": percent(SQUARE), "labels": ["road"]}})]),
+    "Label Studio, a closed vector, and an open one beside it": ("a.json", [task(
+        vector(closed=True), vector(closed=False, vectorlabels=["car"]) | {"id": "b"})]),
     "Label Studio, ground truth": ("a.json", [task(POLYGON, ground_truth=True) | {
         "annotations": [
             task(region(points=percent([[0, 0], [9, 0], [9, 9]])))["annotations"][0],
@@ -149,6 +166,56 @@ def test_two_annotators_of_an_image_cost_it_and_are_named(tmp_path):
         truths, _ = read(tmp_path, "a.json", [*content, other])
         assert truths["1.png"].startswith("it has 2 annotations (of annotators 1 and 2): mark one")
         assert (truths["2.png"] == "road").sum() == 100
+
+
+@pytest.mark.parametrize(
+    ("change", "what"), [({"curved": True}, "curves"), ({"before": ("p0", "p1", "p0")}, "branches")]
+)
+def test_a_vector_whose_area_is_not_known_costs_its_image(tmp_path, change, what):
+    other = task(POLYGON, data={"image": "2.png"})
+    truths, _ = read(tmp_path, "a.json", [task(vector(closed=True, **change)), other])
+    assert truths["1.png"] == f"road is drawn as a vector with {what}"
+
+
+def brushed(opacity):
+    """The runs of Label Studio's brush, of one block without repetition."""
+    pixels = np.repeat(np.uint8(opacity)[..., None], 4, axis=2).ravel()
+    head = f"{pixels.size:032b}" + "00111" + "0010" + "0011" + "0111" + "1111"
+    bits = head + "011" + f"{pixels.size - 1:016b}" + "".join(f"{n:08b}" for n in pixels)
+    bits += "0" * (-len(bits) % 8)
+    return [int(bits[n : n + 8], 2) for n in range(0, len(bits), 8)]
+
+
+@pytest.mark.parametrize("opaque", [1, 100, 255])
+def test_a_brushed_area_is_where_it_is_opaque_by_half_of_its_greatest_opacity(tmp_path, opaque):
+    # The SDK writes 1 for truth values, 100 for contours; the brush itself 255, and less at edges.
+    opacity = np.where(inside(SQUARE), opaque, 0)
+    opacity[0, :2] = opaque // 2
+    region = {"value": {"format": "rle", "rle": brushed(opacity), "brushlabels": ["road"]}}
+    label = one(tmp_path, "a.json", [task(region)])
+    np.testing.assert_array_equal(label == "road", inside(SQUARE))
+
+
+def test_a_bitmask_of_another_size_is_not_put_into_the_corner(tmp_path):
+    def bitmask(pixels):
+        url = "data:image/png;base64," + b64encode(png_of(pixels)).decode()
+        return {"value": {"imageDataURL": url, "bitmasklabels": ["road"]}}
+
+    pixels = np.uint8(255) * inside(SQUARE)
+    label = one(tmp_path, "a.json", [task(bitmask(pixels))])
+    np.testing.assert_array_equal(label == "road", inside(SQUARE))
+    other = task(POLYGON, data={"image": "2.png"})
+    truths, _ = read(tmp_path, "a.json", [task(bitmask(pixels[::2, ::2])), other])
+    assert truths["1.png"] == "a mask of road for an image of another size"
+
+
+def test_a_task_of_several_images_is_that_of_its_first_or_costs_it(tmp_path):
+    pages = {"note": "a", "pages": ["https://x/1.png", "https://x/2.png"]}
+    label = one(tmp_path, "a.json", [task(POLYGON | {"item_index": 0}, data=pages)])
+    np.testing.assert_array_equal(label == "road", inside(SQUARE))
+    other = task(POLYGON, data={"image": "3.png"})
+    truths, _ = read(tmp_path, "a.json", [task(POLYGON | {"item_index": 1}, data=pages), other])
+    assert truths["1.png"] == "a region of road on a further image of the same task"
 
 
 def test_an_address_without_an_ending_names_its_image(tmp_path):

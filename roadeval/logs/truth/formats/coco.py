@@ -55,6 +55,8 @@ def _shapes(
         match annotation.get("segmentation"):
             case {"counts": counts, **rest}:
                 yield run_lengths(label, counts, rest.get("size"), size)
+            case [[_, _], *_] as points if all(len(point) == 2 for point in points):
+                yield shapes.Outline(label, shapes.flatten(points))
             case [[*_], *_] as rings if any(rings):
                 yield from (shapes.Outline(label, ring) for ring in rings if ring)
             case None | [] | [[]]:

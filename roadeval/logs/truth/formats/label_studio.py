@@ -22,7 +22,7 @@ from roadeval.logs.truth import shapes
 
 _UPLOADED: Final = re.compile(r"^[0-9a-f]{8}-(?=.)")
 """The hash that an upload adds before an image's name."""
-_AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL")
+_AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL", "vertices")
 """Keys of the pixels of a region; a key point has none of them, and is left out."""
 _TOOLS: Final = [f"{t}labels" for t in ("polygon", "rectangle", "ellipse", "brush", "bitmask")]
 _UNREADABLE: Final = {"points": ()}
@@ -72,7 +72,11 @@ def _regions(annotation: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def _image(task: Mapping[str, Any], regions: Iterable[Mapping[str, Any]]) -> str:
     """Return the name of a task's image, from the field that the regions refer to if possible."""
     data = task.get("data", task)
-    texts = {name: text for name, text in data.items() if isinstance(text, str)}
+    # A list has the pages of a task; regions on the first one have no index, or 0.
+    fields = {
+        name: [*text, ""][0] if isinstance(text, list) else text for name, text in data.items()
+    }
+    texts = {name: text for name, text in fields.items() if isinstance(text, str)}
     referred = [texts[name] for r in regions if (name := r.get("to_name")) in texts]
     files = [text for text in texts.values() if re.search(r"\.[a-zA-Z]\w{2,3}($|\?)", text)]
     others = [text for text in texts.values() if "/" in text]
@@ -105,6 +109,8 @@ def _shapes(
         place = json.dumps([region.get(name) for name in ("x", *_AREAS)])
         merged.setdefault(region.get("id", place), {}).update(region)
     for region in merged.values():
+        if region.get("vertices") is not None and not region.get("closed"):
+            continue  # a line
         if any(region.get(name) is not None for name in _AREAS) or {*_TOOLS} & region.keys():
             yield _shape(region, size)
 
@@ -117,6 +123,8 @@ def _shape(region: Mapping[str, Any], size: shapes.Size | None) -> shapes.Shape:
             f"a region of {' and '.join(map(str, labels)) or 'no class'}: give it one class"
         )
     (label,) = labels
+    if region.get("item_index"):
+        raise BadMessage(f"a region of {label} on a further image of the same task")
     if size is None or region.get("image_rotation"):
         raise BadMessage(f"a region of {label} on an image that was turned, or of unknown size")
     across, down = size[0] / 100, size[1] / 100
@@ -125,7 +133,11 @@ def _shape(region: Mapping[str, Any], size: shapes.Size | None) -> shapes.Shape:
         return _brushed(label, region["rle"], size)
     if "imageDataURL" in region:
         pixels = to_labels(b64decode(region["imageDataURL"].partition(",")[2]), Limits())
+        if pixels.shape[1::-1] != size:
+            raise BadMessage(_OTHER_SIZE.format(label))
         return shapes.runs_of(label, pixels.reshape(*pixels.shape[:2], -1).max(axis=2) > 0)
+    if "vertices" in region:
+        return _vector(label, region["vertices"], across, down)
     if "points" in region:
         return shapes.Outline(
             label, shapes.flatten((x * across, y * down) for x, y in region["points"])
@@ -137,6 +149,23 @@ def _shape(region: Mapping[str, Any], size: shapes.Size | None) -> shapes.Shape:
     right, bottom = x + region["width"] * across, y + region["height"] * down
     # A rectangle turns about its first corner.
     return shapes.rectangle(label, x, y, right, bottom).rotate(degrees, (x, y))
+
+
+def _vector(
+    label: str, vertices: Sequence[Mapping[str, Any]], across: float, down: float
+) -> shapes.Shape:
+    """Return the area of a closed vector; ``across`` and ``down`` are one percent in pixels."""
+    before = [vertex.get("prevPointId") for vertex in vertices[1:]]
+    follows = [vertex.get("id") for vertex in vertices[:-1]]
+    if any(vertex.get("isBezier") for vertex in vertices):
+        return shapes.Undrawn(label, "vector with curves")
+    if any(before) and before != follows:
+        return shapes.Undrawn(label, "vector with branches")
+    points = ((vertex["x"] * across, vertex["y"] * down) for vertex in vertices)
+    return shapes.Outline(label, shapes.flatten(points))
+
+
+_OTHER_SIZE: Final = "a mask of {} for an image of another size"
 
 
 def _brushed(label: str, numbers: Sequence[int], size: shapes.Size) -> shapes.Runs:
@@ -157,7 +186,7 @@ def _brushed(label: str, numbers: Sequence[int], size: shapes.Size) -> shapes.Ru
 
     total, width = read(32), read(5) + 1
     if total != 4 * size[0] * size[1]:
-        raise BadMessage(f"a mask of {label} for an image of another size")
+        raise BadMessage(_OTHER_SIZE.format(label))
     Limits().check(*size)
     lengths = [read(4) + 1 for _ in range(4)]
     values = np.zeros(total, np.uint8)
@@ -169,8 +198,10 @@ def _brushed(label: str, numbers: Sequence[int], size: shapes.Size) -> shapes.Ru
         start = end
     if start != total:
         raise BadMessage(f"a mask of {label} that does not fit its image")
-    # A pixel at the edge belongs to the area if it is opaque by more than a half.
-    return shapes.runs_of(label, values.reshape(size[1], size[0], 4)[..., 3] > 127)
+    # A pixel at the edge belongs to the area if it is opaque by more than half of the greatest
+    # opacity, which is below 255 if the SDK made it of truth values (1) or of contours (100).
+    opacity = values.reshape(size[1], size[0], 4)[..., 3]
+    return shapes.runs_of(label, opacity > opacity.max() // 2)
 
 
 FORMAT: Final = shapes.LabelFormat("Label Studio", ".json", holds, read)
