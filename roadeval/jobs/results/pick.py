@@ -26,7 +26,7 @@ from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
 from roadeval.runtime.files import AnyPath, Paths, list_paths, put, writing
-from roadeval.runtime.text import likely
+from roadeval.runtime.text import likely, visible
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -149,10 +149,14 @@ def find_recordings(source: Path) -> list[Path]:
     if not is_fleet(source):
         if not (source / SUMMARY).is_file():
             return [source]
-        recording = DriveResult(source).viewable
-        if recording is None:
-            raise RoadevalError(f"{source}: its recording was moved; name its new place")
-        return [recording]
+        result = DriveResult(source)
+        if result.viewable is None:
+            problem = f"its recording is not at {visible(str(result.written))}"
+            remedy = "name the recording, or work in the folder of the replay"
+            if result.facts.run.get("output", {}).get("record") == "none":
+                problem, remedy = "its replay made no recording", "replay without --record none"
+            raise RoadevalError(problem, where=source, remedy=remedy)
+        return [result.viewable]
     drives = FleetFolder(source).drives
     return [path for name in drives.index if (path := recording_path(source, name)).exists()]
 
