@@ -12,7 +12,7 @@ import numpy as np
 
 from roadeval.data import Rgb, as_plain
 from roadeval.data.words import percent
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, check_count
 from roadeval.evaluation.metrics import TESTED
 from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import holding
@@ -45,9 +45,13 @@ def clip(
     errors of the best other variant beside them. The result is a recording, its results folder, or
     a fleet; the output is a folder, or the MP4 or GIF of one clip. The ``worst`` scenes are filmed,
     one clip each, or the given ``frames``, such as ``range(40, 81)``. With ``mcap`` the messages of
-    the log lie beside each clip. A `RoadevalError` if there are no pictures, or a file cannot be
-    written.
+    the log lie beside each clip. A `RoadevalError` if there are no pictures, both ``worst`` and
+    ``frames`` are given, or a file cannot be written.
     """
+    if worst is not None:
+        check_count("worst", worst)
+        if frames is not None:
+            raise RoadevalError("worst and frames do not go together")
     place, films, losses = Path(output), list[Path](), list[str]()
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
     if form is None and place.suffix.lower() in VIDEO_SUFFIXES:

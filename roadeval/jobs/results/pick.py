@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.config.run import RunConfig, run_toml
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, check_count
 from roadeval.evaluation.score.unlabelled import choose_frames, sign_of
 from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PNG: Final = "png"
-"""The format of masks as images: 255 where there is road, 128 where nothing counts."""
+COCO: Final = "coco"
+"""The formats of masks: images, 255 where there is road and 128 where nothing counts; or COCO."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,9 @@ def pick(
     RoadevalError
         If nothing can be picked; its text says what to do.
     """
+    check_count("count", count)
+    check_count("seed", seed, least=0)
+    check_format(labels)
     sources = list_paths(source)
     if not sources:
         raise RoadevalError("nothing to pick from: name a result, a log or a fleet")
@@ -284,6 +288,12 @@ def _write_picks(
         if run:
             put(folder / RUN, run.encode())
         put(folder / PICK, picks.text().encode())
+
+
+def check_format(labels: str) -> None:
+    """Raise a `RoadevalError` if masks to correct are not written in this format."""
+    if labels not in (PNG, COCO):
+        raise RoadevalError(f"labels must be {PNG} or {COCO} (given: {labels!r})")
 
 
 def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, bytes]:
