@@ -347,7 +347,9 @@ def test_the_place_that_changed_most_is_one_that_changed_in_the_same_direction(m
 
     def part(name, mean):
         line = event.first.line._replace(kind="region", part=name, title=f"ERR, {name}")
-        return event.first._replace(line=line, difference=replace(event.first.difference, mean=mean))
+        return event.first._replace(
+            line=line, difference=replace(event.first.difference, mean=mean)
+        )
 
     changes = [event.first, part("near the edge", 0.4), part("in light", -0.9)]
     told = verdict(replace(made, events=[replace(event, changes=changes)]))
