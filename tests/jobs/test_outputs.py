@@ -174,8 +174,7 @@ def test_every_command_knows_a_place_that_is_taken_before_it_computes(
     command, attempted, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    endings = {"replay, recording": ".rrd", "replay, mcap": ".mcap", "report": ".pdf"}
-    ending = endings.get(command, "")
+    ending = {"replay, recording": ".rrd", "replay, mcap": ".mcap"}.get(command, "")
     pipe, within, held = (Path(f"{name}{ending}") for name in ("pipe", "file/new", "held"))
     os.mkfifo(pipe)
     Path("file").touch()

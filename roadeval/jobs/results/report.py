@@ -61,7 +61,7 @@ def write_report(
     on_progress
         Called with each pictured frame of a page.
     """
-    if output and Path(output).suffix.lower() not in (".pdf", *PAGES):
+    if output and Path(output).suffix.lower() not in (".pdf", "", *PAGES):
         raise RoadevalError("the name of a report must end in .pdf or .html", where=output)
     opened = result if isinstance(result, Result) else Result(result, focus=focus)
     (source,) = opened.paths
