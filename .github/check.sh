@@ -2,7 +2,7 @@
 # Replay drives, compare with the last good result, and write one comment that later runs update.
 # It runs on GitHub (action.yml), on GitLab, and in a shell, where it writes files alone.
 #
-#   DRIVES    a drive, or a folder or list of drives
+#   DRIVES    a drive, or a folder or manifest of drives
 #   ARGS      more options of replay or fleet, apart by spaces
 #   FAIL_IF   conditions of compare, one a line; a wrong one ends the check before the replay
 #   BASELINE  the last good result, its URL, or a folder of runs; .roadeval/base by default. None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Integral
 from typing import Any, Self
 
 from roadeval.runtime.sentence import Sentence, Setting, name_settings
@@ -83,3 +84,14 @@ class RoadevalError(Exception):
 
 class SettingError(RoadevalError, ValueError):
     """Settings of one table that cannot be used; the message names them without their table."""
+
+
+def check_count(name: str, number: object, least: int = 1) -> None:
+    """Raise a `RoadevalError` if an argument is not a whole number, or a smaller one than ``least``.
+
+    >>> check_count("worst", 0)
+    Traceback (most recent call last):
+    roadeval.errors.RoadevalError: worst must be a whole number from 1 on (given: 0)
+    """
+    if not isinstance(number, Integral) or number < least:
+        raise RoadevalError(f"{name} must be a whole number from {least} on (given: {number!r})")

@@ -123,8 +123,10 @@ def why_unsure(differences: Iterable[Difference]) -> str:
     changes = list(differences)
     if any(map(is_significant, changes)):
         return ""
-    if reasons := {change.none_because for change in changes if change.low is None} - {""}:
-        return f"no interval, as {listing(sorted(reasons))}"
+    lacking = [change for change in changes if change.low is None]
+    if len(lacking) == len(changes):  # a region that fewer frames or drives have says less
+        most = max(lacking, key=lambda change: change.units, default=None)
+        return f"no interval, as {most.none_because}" if most else ""
     uncorrected = [change for change in changes if is_sure(replace(change, p_holm=None))]
     counts = [change.comparisons for change in uncorrected if change.comparisons]
     family = f", as {max(counts)} regions are compared" if counts else ""

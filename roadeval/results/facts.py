@@ -37,6 +37,8 @@ from roadeval.runtime.text import elide, visible, visible_lines
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; it is written last."""
+DRIVE_RESULTS: Final = "results"
+"""The folder in a fleet's with the results of its drives."""
 ADAPTER_OF: Final = cache(TypeAdapter)
 FETCHED: Final[dict[Path, str]] = {}
 """Public URLs of results that were fetched, by their paths."""
@@ -279,8 +281,9 @@ class FactsFile:
             return cls.parse(read_bounded(path), path)
         except OSError as error:
             raise ResultsError(
-                f"{path.parent}: no results here ({path.name}: {error.strerror}); make some with "
-                "roadeval replay, or roadeval fleet"
+                f"no results here ({path.name}: {error.strerror})",
+                where=path.parent,
+                remedy=_find_results(path.parent),
             ) from error
         except ValueError as error:
             raise cls._damage(path, error) from error
@@ -504,6 +507,16 @@ class FleetFacts(FactsFile):
         *("disturbances", "slices", "why"),
     )
     OPTIONAL = ("misfits", "disturbances", "slices", "why", "origin")
+
+
+def _find_results(folder: Path) -> str:
+    """Return what to do about a folder without results, as a clause."""
+    if (folder / DRIVE_RESULTS).is_dir():
+        return "if it is of a fleet that was stopped, give the same roadeval fleet command again"
+    below = sorted(path.parent for name in (SUMMARY, FLEET) for path in folder.glob(f"*/{name}"))
+    if below:
+        return f"name a folder in it, as {visible(str(below[0]))}"
+    return "make some with roadeval replay, or roadeval fleet"
 
 
 def is_fleet(path: str | Path) -> bool:

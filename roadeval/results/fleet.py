@@ -30,6 +30,7 @@ from roadeval.evaluation.score.scoreboard import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import concatenate, group_rows, is_final, only, values_of
 from roadeval.results.facts import (
+    DRIVE_RESULTS,
     FLEET,
     SUMMARY,
     Facts,
@@ -72,7 +73,6 @@ WRITTEN: Final = (*OF_DRIVES, "classes")
 """The tables of all drives in one file; older fleets have no ``classes``."""
 FILES: Final = (FLEET, RUN, *(f"{table}.parquet" for table in WRITTEN))
 """The files of a fleet's folder; folders beside them have the files of its drives."""
-RESULTS: Final = "results"
 PICTURES: Final = "pictures"
 RECORDINGS: Final = "recordings"
 WORST: Final = 50
@@ -88,12 +88,12 @@ masks. Older fleets have no ``classes``."""
 
 def results_path(folder: Path, drive: str) -> Path:
     """Return the results folder of a drive."""
-    return check_inside(folder / RESULTS / drive, folder)
+    return check_inside(folder / DRIVE_RESULTS / drive, folder)
 
 
 def made_path(folder: Path, drive: str) -> Path:
     """Return the file that says how a drive's results were made."""
-    return check_inside(folder / RESULTS / f"{drive}.json", folder)
+    return check_inside(folder / DRIVE_RESULTS / f"{drive}.json", folder)
 
 
 def recording_path(folder: Path, drive: str) -> Path:
@@ -363,11 +363,11 @@ class FleetWriter:
                 with suppress(ValueError):  # a damaged file is written again
                     path = self.folder / FLEET
                     check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
-            elif not (self.folder / RESULTS).is_dir() and any(self.folder.glob("*")):
+            elif not (self.folder / DRIVE_RESULTS).is_dir() and any(self.folder.glob("*")):
                 raise ResultsError(
                     f"{self.folder}: holds other files and is not a fleet's folder; name a new one"
                 )
-            (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
+            (self.folder / DRIVE_RESULTS).mkdir(parents=True, exist_ok=True)
             for path in self.folder.iterdir():  # the folder may come from anybody
                 check_inside(path, self.folder)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
@@ -150,10 +151,12 @@ def verdict(history: History) -> str:
     first = ranked[0].first
     text = describe_change(first, f" in the run of {history.runs[ranked[0].run].name}")
     parts = [c for c in ranked[0].changes if c.line.kind != ALL and c.line.variant == focus]
-    most = max(parts, key=lambda part: abs(part.difference.mean), default=first)
-    if abs(most.difference.mean) > 1.5 * abs(first.difference.mean):
-        text += f"; most of all {most.line.title} ({points(most.difference.mean)})"
-    text += f". Changed there: {'; '.join(ranked[0].reasons[:2])}"
+    sign = math.copysign(1, first.difference.mean)
+    most = max(parts, key=lambda part: sign * part.difference.mean, default=first)
+    if sign * most.difference.mean > 1.5 * abs(first.difference.mean):
+        place = most.line.title.removeprefix(f"{most.line.rate}, ")
+        text += f"; most of all: {place} ({points(most.difference.mean)})"
+    text += f". Changed in that run: {'; '.join(ranked[0].reasons[:2])}"
     if not standing:
         return f"{text}. It is the last change in {count}."
     more = f", nor {counted(len(ranked) - 1, 'other rise')}" if len(ranked) > 1 else ""

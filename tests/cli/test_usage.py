@@ -91,6 +91,18 @@ def test_what_is_mistyped_is_guessed_or_told_in_its_right_form(words, meant, cap
             "--list opens nothing; give it without --frame and --screenshot",
         ),
         (
+            ["report", "a.rrd", "--width", "8.5cm"],
+            "--width and --title are of --figures: give them with it",
+        ),
+        (
+            ["report", "a.rrd", "--title", "none"],
+            "--width and --title are of --figures: give them with it",
+        ),
+        (
+            ["report", "a.rrd", "--figures", "f", "--audit", "a"],
+            "--audit is of a report: give --output, too",
+        ),
+        (
             ["replay", "a.mcap", "--ignore-label", "3"],
             "--ignore-label: needs --road-label; name the values that mean road",
         ),

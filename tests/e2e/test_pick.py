@@ -272,7 +272,8 @@ def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
     [
         (("out.rrd", "-n", 5, "-o", "reports"), "holds something else"),
         (("out.rrd", "-n", 5, "-o", "x", "--by", "nobody"), "no variant nobody; there are"),
-        (("moved", "-n", 5, "-o", "x"), "moved: its recording was moved"),
+        (("moved", "-n", 5, "-o", "x"), "moved: its recording is not at elsewhere.rrd; name"),
+        (("unrecorded", "-n", 5, "-o", "x"), "unrecorded: its replay made no recording; replay"),
         (("whole.mcap", "-n", 5, "-o", "x"), "whole.mcap: every frame has truth"),
         (("nothing.rrd", "-n", 5, "-o", "x"), "nothing.rrd"),
     ],
@@ -281,8 +282,10 @@ def test_what_cannot_be_picked_is_one_line(work, words, said):
     shutil.copy(work / "street.mcap", work / "whole.mcap")
     facts = json.loads((work / "reports" / "summary.json").read_text())
     facts["run"]["output"]["save"] = "elsewhere.rrd"
-    (work / "moved").mkdir()
-    (work / "moved" / "summary.json").write_text(json.dumps(facts))
+    for name, record in (("moved", "all"), ("unrecorded", "none")):
+        facts["run"]["output"]["record"] = record
+        (work / name).mkdir()
+        (work / name / "summary.json").write_text(json.dumps(facts))
     done = here("pick", *words, "--quiet", cwd=work)
     assert done.returncode == 1
     assert said in done.stderr

@@ -166,6 +166,19 @@ def test_a_camera_without_labels_is_recorded_and_says_why(rig: Path, tmp_path: P
     alone = roadeval.Recording(tmp_path / "o.rrd", f"/rear{IMAGE}")
     assert alone.layer("unfiltered", "post", frame=5).any()
     assert here("report", tmp_path / "o.rrd", "-o", tmp_path / "o.pdf").returncode == 0
+    listed = here("inspect", tmp_path / "o.rrd", "--list", "--json")
+    assert {frame["camera"] for frame in json.loads(listed.stdout)} == {f"/front{IMAGE}"}
+    assert here("inspect", tmp_path / "o.rrd", "--list").returncode == 0
+
+
+def test_errors_are_filmed_before_the_doubt_of_a_camera_without_labels(rig: Path, tmp_path: Path):
+    log = a_rig(tmp_path / "half.mcap", {"rear": (0, 30), "front": (0, 30)}, without={"rear"})
+    places = "--save", tmp_path / "o.rrd", "-o", tmp_path / "o", "-q"
+    assert here("replay", log, *topics("rear", "front"), *places).returncode == 0
+    films, _ = roadeval.clip(tmp_path / "o.rrd", tmp_path / "clips", worst=9)
+    cameras = ["front" if "front" in film.name else "rear" for film in films]
+    assert cameras == sorted(cameras)
+    assert {*cameras} == {"front", "rear"}
 
 
 @pytest.mark.parametrize(

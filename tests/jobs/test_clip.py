@@ -149,7 +149,7 @@ def test_a_results_folder_stands_for_its_recording(recording, tmp_path):
     ("words", "code", "sentence"),
     [
         (("--worst", "2", "-o", "b.gif"), 1, "b.gif: a file holds one clip: name a folder"),
-        (("--frames", "400:800"), 1, "drive.rrd: no pictures of such frames"),
+        (("--frames", "400:800"), 1, "such frames; there are some of 0 to 29\n"),
         (("--focus", "nobody"), 1, "--focus: there is no variant nobody"),
         (("--frames", "40-80"), 2, "--frames"),
         (("--frames", "80:40"), 2, "80:40: write the first and the last frame, as 40:80"),

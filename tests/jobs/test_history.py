@@ -342,6 +342,20 @@ def test_a_last_run_without_numbers_neither_undoes_a_step_nor_is_good(nights, tm
     assert verdict(history(folder)) == verdict(made)
 
 
+def test_the_place_that_changed_most_is_one_that_changed_in_the_same_direction(made):
+    (event,) = made.events
+
+    def part(name, mean):
+        line = event.first.line._replace(kind="region", part=name, title=f"ERR, {name}")
+        return event.first._replace(
+            line=line, difference=replace(event.first.difference, mean=mean)
+        )
+
+    changes = [event.first, part("near the edge", 0.4), part("in light", -0.9)]
+    told = verdict(replace(made, events=[replace(event, changes=changes)]))
+    assert "; most of all: near the edge (+40.00). Changed in that run: commit" in told
+
+
 def test_whether_a_rise_stands_is_no_matter_of_the_last_run_alone(made):
     (event,) = made.events
     line = event.first.line

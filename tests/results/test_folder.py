@@ -157,6 +157,20 @@ def test_a_table_that_was_cut_or_taken_away_is_refused(tmp_path: Path, table: st
         assert str(caught.value) == f"{path}: {agreed}; {again}"
 
 
+def test_a_folder_without_results_says_where_some_are(tmp_path: Path) -> None:
+    def told() -> str:
+        with pytest.raises(ResultsError) as caught:
+            ResultsFolder(tmp_path)
+        return str(caught.value)
+
+    missing = f"{tmp_path}: no results here (summary.json: No such file or directory); "
+    assert told() == f"{missing}make some with roadeval replay, or roadeval fleet"
+    write(tmp_path / "monday")
+    assert told() == f"{missing}name a folder in it, as {tmp_path / 'monday'}"
+    (tmp_path / "results").mkdir()
+    assert told().endswith("that was stopped, give the same roadeval fleet command again")
+
+
 def test_a_table_with_one_number_changed_is_refused(tmp_path: Path) -> None:
     write(tmp_path)
     path = tmp_path / "heat.csv"

@@ -71,6 +71,14 @@ def test_why_no_region_is_sure_is_told(row, why):
     assert why in comparison.where(a_comparison(a_change(WORSE, "net"), regions=(part,)))[0]
 
 
+def test_a_region_without_an_interval_hides_no_other():
+    few, known = replace(a_difference(8), units=2), a_difference(8, -1, 17)
+    told = [comparison.why_unsure(rows) for rows in ([few, known], [few, a_difference(8)])]
+    assert told[0] == "each change may be chance"
+    assert told[1].startswith("no interval, as 12 frames are too few for an interval")
+    assert " and " not in told[1]
+
+
 def test_changed_settings_are_told_of_each_result_and_some_of_many():
     chains = ["svm"], ["trees", "post"]
     settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}

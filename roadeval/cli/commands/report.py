@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
 from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
+
+WIDTH: Final = "16cm"
+TITLE: Final = "drive"
 
 
 def _check_width(width: str) -> str:
@@ -74,8 +77,8 @@ def report(
     output: Output = None,
     focus: arguments.Focus = None,
     figures: Figures = None,
-    width: Width = "16cm",
-    title: Title = "drive",
+    width: Width = WIDTH,
+    title: Title = TITLE,
     open_report: Opened = False,
     audit: Audit = None,
     camera: arguments.Camera = None,
@@ -90,6 +93,10 @@ def report(
     frames to look at. A recording is enough; the report of a results folder has no pictures. A
     page is one file that needs no network and no server.
     """
+    if not figures and (width, title) != (WIDTH, TITLE):
+        raise typer.BadParameter("--width and --title are of --figures: give them with it")
+    if figures and audit and not output:
+        raise typer.BadParameter("--audit is of a report: give --output, too")
     from roadeval.jobs.results.report import write_figures, write_report
     from roadeval.jobs.results.result import Result
 

@@ -14,12 +14,12 @@ from pydantic import TypeAdapter
 
 from roadeval.config.run import RunConfig, configure
 from roadeval.data import IGNORE, ROAD, colours
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, check_count
 from roadeval.evaluation.score.label_errors import BLOCK, LabelledView, find_suspects, rank_suspects
 from roadeval.evaluation.tables import concatenate
 from roadeval.images.decoding import png_of
 from roadeval.jobs.progress import OnProgress, ignore
-from roadeval.jobs.results.pick import PNG, open_drives, proposal_files
+from roadeval.jobs.results.pick import PNG, check_format, open_drives, proposal_files
 from roadeval.jobs.results.result import DriveResult
 from roadeval.logs.settings import AUDIT
 from roadeval.logs.truth.audits import FORMAT
@@ -93,6 +93,8 @@ def audit(
     RoadevalError
         If there are no labels to look at, or the folder is not empty.
     """
+    check_count("count", count)
+    check_format(labels)
     path, config = Path(source), config or configure({"preset": PRESET})
     output = None if folder is None else Path(folder)
     if output and output.exists() and any(output.iterdir()):

@@ -12,7 +12,8 @@ import numpy as np
 
 from roadeval.data import Rgb, as_plain
 from roadeval.data.words import percent
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, check_count
+from roadeval.evaluation.metrics import TESTED
 from roadeval.fleet.remote import open_source
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -44,9 +45,13 @@ def clip(
     errors of the best other variant beside them. The result is a recording, its results folder, or
     a fleet; the output is a folder, or the MP4 or GIF of one clip. The ``worst`` scenes are filmed,
     one clip each, or the given ``frames``, such as ``range(40, 81)``. With ``mcap`` the messages of
-    the log lie beside each clip. A `RoadevalError` if there are no pictures, or a file cannot be
-    written.
+    the log lie beside each clip. A `RoadevalError` if there are no pictures, both ``worst`` and
+    ``frames`` are given, or a file cannot be written.
     """
+    if worst is not None:
+        check_count("worst", worst)
+        if frames is not None:
+            raise RoadevalError("worst and frames do not go together")
     place, films, losses = Path(output), list[Path](), list[str]()
     form = {".mp4": "mp4", ".gif": "gif"}.get(place.suffix.lower())
     if form is None and place.suffix.lower() in VIDEO_SUFFIXES:
@@ -54,10 +59,13 @@ def clip(
     results = [Result(path, focus=focus) for path in find_recordings(local_path(result))]
     drives = [drive for opened in results for drive in (*opened.rig, opened.drive) if drive]
     scenes = [*_scenes(drives, worst or (1 if form else 5), frames)]
-    if not scenes or (form and len(scenes) > 1):
-        one_clip = "a file holds one clip: name a folder"
+    if not scenes:
         none = "no pictures of such frames were kept; --record keeps some, and in a fleet --keep"
-        raise RoadevalError(one_clip if scenes else none, where=place if scenes else result)
+        if frames is not None and (held := [n for drive in drives for n in drive.pictured]):
+            none = f"no pictures of such frames; there are some of {min(held)} to {max(held)}"
+        raise RoadevalError(none, where=result)
+    if form and len(scenes) > 1:
+        raise RoadevalError("a file holds one clip: name a folder", where=place)
     # The colour matrix is stated, because a player would guess it from the size. x264's tree of
     # macroblocks is off: with it (build 165, AVX-512) one encoding in a hundred of equal pictures
     # has other bytes.
@@ -89,7 +97,8 @@ def _scenes(
             ranked += [(drive, frame) for frame in rank_frames(drive, number, drive.pictured)]
         elif numbers := [frame for frame in drive.pictured if frame in frames]:
             yield drive, numbers, f"{as_plain(drive.title)}-{numbers[0]:04d}-{numbers[-1]:04d}"
-    ranked.sort(key=lambda pair: -(pair[1].rates[pair[1].by] or 0.0))
+    # Errors come first: the doubt of a camera without truth is not an error rate.
+    ranked.sort(key=lambda pair: (pair[1].by != TESTED, -(pair[1].rates[pair[1].by] or 0.0)))
     for drive, worst in ranked[:number]:
         times = drive.recording.stamps if drive.recording else {}
         stamps = np.array([times[frame] for frame in drive.pictured])

@@ -16,7 +16,7 @@ import numpy as np
 
 from roadeval.data import BASELINE
 from roadeval.data.words import first_of, setting
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, check_count
 from roadeval.evaluation.comparison import history as search
 from roadeval.evaluation.comparison.compare import changed_settings
 from roadeval.evaluation.comparison.conditions import Condition
@@ -121,6 +121,7 @@ def history(
     fail_if
         Conditions on the last run, see `roadeval.evaluation.comparison.conditions`.
     """
+    check_count("last", last)
     conditions = [Condition.parse(text) for text in fail_if]
     listing = list_results(results)
     lost: list[str] = [error.sentence for error in listing.errors]

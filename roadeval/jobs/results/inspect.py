@@ -56,9 +56,10 @@ class WorstFrame:
 def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
     """Rank the worst frames by ERR of the focus's mask; of each scene only the worst counts.
 
-    If nothing was scored, the frames are ranked by the doubt in the mask. In a fleet the frames of
-    all drives are ranked together, and by default all ranked frames are returned. A `RoadevalError`
-    if nothing ranks the frames, for example if ERR is undefined on every frame.
+    If nothing was scored, the frames are ranked by the doubt in the mask; cameras of a rig without
+    truth are left out if another camera was scored. In a fleet the frames of all drives are ranked
+    together, and by default all ranked frames are returned. A `RoadevalError` if nothing ranks the
+    frames, for example if ERR is undefined on every frame.
     """
     if fleet := result.fleet:
         if fleet.worst.empty:
@@ -75,6 +76,7 @@ def worst_frames(result: Result, count: int | None = None) -> list[WorstFrame]:
             for path in [recording_path(fleet.path, row["drive"])]
         ]
     cameras = result.rig or [drive for drive in [result.drive] if drive]
+    cameras = [camera for camera in cameras if camera.facts.focus] or cameras
     frames = [frame for camera in cameras for frame in rank_frames(camera, count or LISTED)]
     frames = sorted(frames, key=lambda frame: -(frame.rates[frame.by] or 0.0))[: count or LISTED]
     frames = [replace(frame, rank=rank) for rank, frame in enumerate(frames, 1)]

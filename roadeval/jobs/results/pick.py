@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.config.run import RunConfig, run_toml
-from roadeval.errors import RoadevalError
+from roadeval.errors import RoadevalError, check_count
 from roadeval.evaluation.score.unlabelled import choose_frames, sign_of
 from roadeval.evaluation.tables import only, values_of
 from roadeval.images.decoding import png_of
@@ -26,14 +26,15 @@ from roadeval.results.facts import SUMMARY, is_fleet
 from roadeval.results.fleet import FleetFolder, recording_path
 from roadeval.results.folder import RUN
 from roadeval.runtime.files import AnyPath, Paths, list_paths, put, writing
-from roadeval.runtime.text import likely
+from roadeval.runtime.text import likely, visible
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PNG: Final = "png"
-"""The format of masks as images: 255 where there is road, 128 where nothing counts."""
+COCO: Final = "coco"
+"""The formats of masks: images, 255 where there is road and 128 where nothing counts; or COCO."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,9 @@ def pick(
     RoadevalError
         If nothing can be picked; its text says what to do.
     """
+    check_count("count", count)
+    check_count("seed", seed, least=0)
+    check_format(labels)
     sources = list_paths(source)
     if not sources:
         raise RoadevalError("nothing to pick from: name a result, a log or a fleet")
@@ -149,10 +153,14 @@ def find_recordings(source: Path) -> list[Path]:
     if not is_fleet(source):
         if not (source / SUMMARY).is_file():
             return [source]
-        recording = DriveResult(source).viewable
-        if recording is None:
-            raise RoadevalError(f"{source}: its recording was moved; name its new place")
-        return [recording]
+        result = DriveResult(source)
+        if result.viewable is None:
+            problem = f"its recording is not at {visible(str(result.written))}"
+            remedy = "name the recording, or work in the folder of the replay"
+            if result.facts.run.get("output", {}).get("record") == "none":
+                problem, remedy = "its replay made no recording", "replay without --record none"
+            raise RoadevalError(problem, where=source, remedy=remedy)
+        return [result.viewable]
     drives = FleetFolder(source).drives
     return [path for name in drives.index if (path := recording_path(source, name)).exists()]
 
@@ -280,6 +288,12 @@ def _write_picks(
         if run:
             put(folder / RUN, run.encode())
         put(folder / PICK, picks.text().encode())
+
+
+def check_format(labels: str) -> None:
+    """Raise a `RoadevalError` if masks to correct are not written in this format."""
+    if labels not in (PNG, COCO):
+        raise RoadevalError(f"labels must be {PNG} or {COCO} (given: {labels!r})")
 
 
 def proposal_files(proposals: Sequence[Proposal], labels: str) -> dict[str, bytes]:

@@ -52,8 +52,8 @@ def write_report(
         A recording, whole or partial, a results folder, or a fleet's folder; or one of these opened
         already. Without a recording there are no pictures of a single drive.
     output
-        By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
-        in ``.html`` gives a page.
+        A PDF, or a page with a name that ends in ``.html``. By default ``report.pdf`` in the
+        folder, or ``reports/<recording>.pdf``.
     focus
         The variant that the report is about; see `roadeval.Result`, which has it if it was opened.
     audit
@@ -61,6 +61,8 @@ def write_report(
     on_progress
         Called with each pictured frame of a page.
     """
+    if output and Path(output).suffix.lower() not in (".pdf", "", *PAGES):
+        raise RoadevalError("the name of a report must end in .pdf or .html", where=output)
     opened = result if isinstance(result, Result) else Result(result, focus=focus)
     (source,) = opened.paths
     name = opened.drive.camera if opened.drive else ""
@@ -136,6 +138,8 @@ def write_figures(
     from roadeval.report import figures
 
     inches = inches_of(width)
+    if title not in ("drive", "none"):
+        raise RoadevalError(f"title must be drive or none (given: {title!r})")
     opened = result if isinstance(result, Result) else Result(result)
     drives = opened.rig or list(filter(None, [opened.drive]))
     if not drives:

@@ -136,6 +136,12 @@ class DriveResult:
         words = ["roadeval", "inspect", FETCHED.get(path, str(path)), *camera]
         return f"{shlex.join(words)} --frame {frame}"
 
+    @property
+    def written(self) -> Path:
+        """The place where the run wrote its recording, if it made one."""
+        place = self.facts.run.get("output", {}).get("save")
+        return Path(place or Path("recordings", f"{self.name}.rrd"))
+
     @cached_property
     def viewable(self) -> Path | None:
         """The recording for the viewer: this one, or the recording of a results folder's run.
@@ -144,8 +150,7 @@ class DriveResult:
         """
         if self.recording is not None:
             return self.path if self.pictured else None
-        written = self.facts.run.get("output", {}).get("save")
-        path = Path(written or Path("recordings", f"{self.name}.rrd"))
+        path = self.written
         # A summary from elsewhere may name a network share, which Windows would contact.
         if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None

@@ -31,14 +31,13 @@ from roadeval.jobs.run.train import training_frames
 from roadeval.logs.truth.meaning import label_files
 from roadeval.recording.layout import RecordingError
 from roadeval.report.images import LayerImage, jpeg, shrink
-from roadeval.results.facts import SUMMARY, Facts, focus_of, json_text
+from roadeval.results.facts import DRIVE_RESULTS, SUMMARY, Facts, focus_of, json_text
 from roadeval.results.fleet import (
     APART_NS,
     CACHED,
     OF_A_DRIVE,
     PICTURES,
     RECORDINGS,
-    RESULTS,
     Made,
     cache,
     cached_path,
@@ -149,7 +148,7 @@ def report_drive(folder: Path, made: Made, *, repeated: bool = False) -> Done:
 
 def mark_failed(task: DriveTask, reason: str, exit_code: int = 1) -> Made:
     """Remove files of earlier replays of a drive, and return why it could not be used."""
-    _remove(task, RESULTS, PICTURES, RECORDINGS, *CACHED)
+    _remove(task, DRIVE_RESULTS, PICTURES, RECORDINGS, *CACHED)
     stamp = stamp_files(task.entry, task.config)
     how = task.fold, task.model or None
     return Made(task.entry.id, task.asked, stamp, *how, problem=reason, exit_code=exit_code)
@@ -229,7 +228,7 @@ def _remove(task: DriveTask, *folders: str) -> None:
     folder, drive = task.folder, task.entry.id
     recording = recording_path(folder, drive)
     paths = {
-        RESULTS: results_path(folder, drive),
+        DRIVE_RESULTS: results_path(folder, drive),
         **{name: cached_path(folder, name, drive).parent for name in CACHED},
         PICTURES: folder / PICTURES / drive,
         RECORDINGS: recording,
