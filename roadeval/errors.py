@@ -87,7 +87,7 @@ class SettingError(RoadevalError, ValueError):
 
 
 def check_count(name: str, number: object, least: int = 1) -> None:
-    """Raise a `RoadevalError` if an argument is not a whole number, or a smaller one than ``least``.
+    """Raise a `RoadevalError` if an argument is not a whole number of at least ``least``.
 
     >>> check_count("worst", 0)
     Traceback (most recent call last):
