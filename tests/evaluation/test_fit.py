@@ -317,6 +317,21 @@ def test_what_a_method_always_gets_wrong_is_no_sign_against_labels() -> None:
     assert describe_suspects(suspects) == "No label is clearly wrong."
 
 
+def test_a_label_like_those_beside_it_is_not_of_another_frame() -> None:
+    """The road stays, other things do not, and the method fails on one frame."""
+    failed, noise = np.zeros(SIZE[::-1], np.uint8), np.random.default_rng(0)
+    still = [
+        LabelledView.of(
+            *(frame, frame * 10**9, noise.integers(0, 256, (*SIZE[::-1], 3), np.uint8)),
+            road_ahead(0),
+            {"mine": failed if frame == 9 else road_ahead(0)},
+        )
+        for frame in range(LABELS)
+    ]
+    suspects = find_suspects(still)
+    assert (suspects["frame"].tolist(), suspects["reason"].tolist()) == ([9], [LabelFlaw.METHODS])
+
+
 def test_narrow_pictures_have_no_neighbours_to_compare() -> None:
     label = np.ones((20, 320), np.uint8)
     narrow = [

@@ -259,7 +259,9 @@ def _explain(
         return None, ""
     unlike = (roads[:, ::2, ::2] ^ road[::2, ::2]).mean(axis=(1, 2))
     unlike[place] = 1
-    if unlike.min() < 0.1 * before:
+    # A label like those beside it fits the drive: where the road changes little, many are alike.
+    beside = unlike[max(place - 1, 0) : place + 2]
+    if unlike.min() < 0.1 * before and beside.min() > 0.5 * before:
         return LabelFlaw.ANOTHER_FRAME, str(views[unlike.argmin()].frame)
     seen = view.ignored == 0
     if ((road[:, ::-1] ^ expected) & seen).mean() < 0.5 * before:
