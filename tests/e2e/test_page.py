@@ -212,6 +212,7 @@ def picture_of(tab, canvas):
     return np.array(pixels, int).reshape(shape)[..., :3]
 
 
+@pytest.mark.sweep
 def test_the_film_shows_the_errors_of_every_frame(tab, demo):
     recording = Recording(demo.recording)
 
@@ -368,6 +369,7 @@ def graded(tmp_path_factory):
     return folder
 
 
+@pytest.mark.sweep
 def test_a_moved_threshold_gives_the_rates_of_a_replay_at_it(graded, watched, tmp_path):
     tab = watched((graded / "page.html").as_uri()).tab
     slider, told = tab.locator(".threshold input"), tab.locator(".threshold p")
