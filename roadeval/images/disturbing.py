@@ -172,7 +172,7 @@ class DisturbanceKind(NamedTuple):
     name: str
     """Its word in ``--disturb`` and, with the strength, in tables and paths: lower-case letters."""
     title: str
-    """What the strength is, such as ``stops of less light``."""
+    """Unit of the strength, such as ``stops of less light``."""
     apply: Apply
     """Returns the disturbed image as a new array, ``(H, W, 3)`` uint8; not called at strength 0."""
     least: float
