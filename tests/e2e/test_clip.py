@@ -25,6 +25,7 @@ def test_the_demo_gives_five_clips_and_the_messages_of_each(demo, tmp_path):
     )
 
 
+@pytest.mark.sweep
 @pytest.mark.skipif(bool(missing()), reason=missing())
 def test_a_clip_plays_in_a_browser_in_its_colours(demo, tmp_path, watched):
     run = here("clip", demo.recording, "-o", tmp_path / "film.mp4", "-q")

@@ -442,7 +442,10 @@ def test_a_variant_beside_the_focus_is_shown_alone_with_it(tab):
     assert shown(tab, "#summary tbody th") == ["filtered", "unfiltered", "blind"]
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (390, "dark")])
+@pytest.mark.parametrize(
+    ("width", "scheme"),
+    [(1440, "light"), pytest.param(390, "dark", marks=pytest.mark.sweep)],
+)
 def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
     drive, fleet, scheme, width, watched
 ):

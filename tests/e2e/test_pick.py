@@ -134,6 +134,7 @@ def test_what_the_ranked_part_shows_never_enters_the_number(work, truths):
     assert len(after["estimate"]["apart"]) == 5
 
 
+@pytest.mark.sweep
 def test_labels_in_coco_give_the_numbers_of_the_images(work, truths, labelled):
     _, images, _ = labelled
     label(work / "to_label", truths, form="coco")
@@ -247,6 +248,7 @@ def test_a_folder_that_has_all_frames_stays_as_it_is(begun, tmp_path):
     assert file.read_bytes() == proposals
 
 
+@pytest.mark.sweep
 def test_a_log_is_replayed_first_and_several_drives_have_a_folder_each(
     work, truths, without_workers
 ):

@@ -164,6 +164,7 @@ def steps():
 PULL = {"pull_request": {"number": 5}}
 
 
+@pytest.mark.sweep
 def test_a_repository_has_a_baseline_then_one_comment_that_each_push_updates(check, site):
     first = check("good", {"ref": "refs/heads/main"})
     assert first.returncode == 0, first.stderr

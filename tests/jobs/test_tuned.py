@@ -281,6 +281,7 @@ def test_what_was_learnt_elsewhere_is_used_and_adapted(folder, tmp_path):
         assert err(rows, "mine_tuned") < err(rows, "mine") / 3
 
 
+@pytest.mark.sweep
 def test_in_a_fleet_each_drive_is_scored_by_what_others_taught(folder, tmp_path):
     """A network, and confidences beside the log, each with what is tuned of it."""
     drives = [write(tmp_path / f"{n}.mcap", first=100 * n) for n in range(2)]

@@ -130,6 +130,7 @@ def test_no_module_needs_posix_to_be_imported():
     assert int(run.stdout) > 100
 
 
+@pytest.mark.sweep
 def test_a_gate_needs_the_packages_of_its_list_alone(tmp_path):
     listed = (ROOT / "docs" / "gate.txt").read_text()
     generated = runpy.run_path(str(ROOT / "docs" / "generated.py"))

@@ -34,6 +34,7 @@ def test_the_tour_of_the_api_runs(tmp_path, monkeypatch, capsys):
     assert wanted <= {path.name for path in out.iterdir()}
 
 
+@pytest.mark.sweep
 def test_the_example_package_is_installed_and_used_by_its_entry_points(tmp_path):
     pytest.importorskip("setuptools", minversion="77", reason="builds the example")
     shutil.copytree(ROOT / "examples" / "method", tmp_path / "method")  # a build leaves files
