@@ -129,8 +129,8 @@ def _check_tiff(data: File) -> None:
             for place in count(1):
                 image.seek(place)
                 if not image.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
-                    what = "a TIFF of several images"
-                    raise ImageError(f"{what}: save each label in a file of its own")
+                    problem = "a TIFF of several images: save each label in a file of its own"
+                    raise ImageError(problem)
 
 
 def _label_values(image: Any, data: File) -> Array:

@@ -190,11 +190,8 @@ class ClassMap:
             raise BadMessage("it holds colours, not label values")
         if self.colours and values.dtype == np.uint8:
             used = np.bincount(values.ravel()).nonzero()[0].tolist()
-            for value, colour in palette_colours(picture, used).items():
-                if (other := self.colours.get(value, colour)) != colour:
-                    problem = "its palette has the colour {} for {}, and others have {}"
-                    words = problem.format(_color_name(colour), value, _color_name(other))
-                    raise BadMessage(words, remedy=NAME_COLOURS)
+            if problem := palette_problem(self.colours, palette_colours(picture, used)):
+                raise BadMessage(problem, remedy=NAME_COLOURS)
         return Labels(self.of_values(values), self.codes.of(values) if self.codes else None)
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
@@ -247,10 +244,8 @@ class Confidence:
         """Return a warning if the greatest code of some maps tells that 1 has another code."""
         if greatest not in SCALES and greatest >= self.threshold * TOP:
             return ()
-        share = f"the greatest confidence that was looked at is {greatest / TOP:.2g}"
-        return (
-            f"{share}: 255 means 1 in 8 bits, and 65535 in 16 bits; scale percent, for example",
-        )
+        greatest_share = f"the greatest confidence that was looked at is {greatest / TOP:.2g}"
+        return (f"{greatest_share}: write 1 as 255 in 8 bits, or as 65535 in 16 bits",)
 
     def codes(self, picture: Picture, limits: Limits) -> Probability:
         """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
@@ -322,18 +317,27 @@ _REPAIR: Final = (
 )
 
 
-def merge_colours(palettes: Mapping[str, Mapping[int, int]]) -> dict[int, int]:
-    """Return the packed colours of values, given those of each label with a palette by its place.
+def palette_problem(colours: Mapping[int, int], palette: Mapping[int, int]) -> str:
+    """Return the first value that a palette and other labels give different packed colours."""
+    for value, colour in palette.items():
+        if (other := colours.get(value, colour)) != colour:
+            names = _color_name(colour), _color_name(other)
+            return "its palette has the colour {1} for {0}, and others have {2}".format(
+                value, *names
+            )
+    return ""
 
-    A `LogError` if a value has two: then values mean nothing by themselves.
+
+def merge_colours(palettes: Mapping[str, Mapping[int, int]]) -> dict[int, int]:
+    """Return the packed colours of values, given the colours in each label's palette by its place.
+
+    A `LogError` if a value has two colours: then values mean nothing by themselves.
     """
     colours: dict[int, int] = {}
     for place, palette in palettes.items():
-        for value, colour in palette.items():
-            if (other := colours.setdefault(value, colour)) != colour:
-                problem = "its palette has the colour {} for {}, and that of another label has {}"
-                words = problem.format(_color_name(colour), value, _color_name(other))
-                raise LogError(words, where=place, remedy=NAME_COLOURS)
+        if problem := palette_problem(colours, palette):
+            raise LogError(problem, where=place, remedy=NAME_COLOURS)
+        colours |= palette
     return colours
 
 

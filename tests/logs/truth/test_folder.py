@@ -221,7 +221,7 @@ def test_classes_that_are_stored_as_floats_keep_their_numbers(read):
 def test_confidences_that_seem_to_have_another_scale_are_told(tmp_path, levels, threshold, is_told):
     (tmp_path / "0.png").write_bytes(png(levels))
     notes = meaning_of(opened(tmp_path), MaskSettings(str(tmp_path), threshold=threshold)).notes
-    assert any("255 means 1 in 8 bits" in note for note in notes) == is_told
+    assert any("write 1 as 255 in 8 bits" in note for note in notes) == is_told
 
 
 def test_rounding_takes_no_confidence_beyond_its_ends():

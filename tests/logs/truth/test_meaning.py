@@ -190,7 +190,7 @@ FEWER = palette_png([[0, 1, 1]], [*BLACK, *ROAD])
 
 
 def test_a_value_with_two_colours_is_refused_and_the_colours_are_read(tmp_path) -> None:
-    problem = "1.png: its palette has the colour 64,32,32 for 1, and that of another label has 204"
+    problem = "1.png: its palette has the colour 64,32,32 for 1, and others have 204"
     with pytest.raises(LogError, match=rf"{problem},0,255; name .*`labels.road_colors`"):
         meaning_of_palettes(tmp_path, MANY, FEWER, road=(2,))
     meaning = meaning_of_palettes(tmp_path, MANY, FEWER, road_colors=(ROAD,))

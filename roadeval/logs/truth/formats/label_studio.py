@@ -26,6 +26,7 @@ _AREAS: Final = ("points", "height", "radiusX", "rle", "imageDataURL", "vertices
 """Keys of the pixels of a region; a key point has none of them, and is left out."""
 _TOOLS: Final = [f"{t}labels" for t in ("polygon", "rectangle", "ellipse", "brush", "bitmask")]
 _UNREADABLE: Final = {"points": ()}
+_OTHER_SIZE: Final = "a mask of {} for an image of another size"
 
 
 def holds(_: Path, content: Any) -> bool:
@@ -163,9 +164,6 @@ def _vector(
         return shapes.Undrawn(label, "vector with branches")
     points = ((vertex["x"] * across, vertex["y"] * down) for vertex in vertices)
     return shapes.Outline(label, shapes.flatten(points))
-
-
-_OTHER_SIZE: Final = "a mask of {} for an image of another size"
 
 
 def _brushed(label: str, numbers: Sequence[int], size: shapes.Size) -> shapes.Runs:
