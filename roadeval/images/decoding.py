@@ -108,8 +108,8 @@ def lossy_format(data: File) -> str:
     return "" if format_.exact else format_.name
 
 
-_REDUCED_OR_OPACITY: Final = 1 | 4
-"""Bits of a TIFF page's kind: an image made smaller, as a preview has it, or an opacity."""
+_REDUCED: Final = 1
+"""Bit of the kind of a TIFF page: the image made smaller, such as a preview."""
 
 
 def _check_tiff(data: File) -> None:
@@ -124,11 +124,11 @@ def _check_tiff(data: File) -> None:
             )
         if (bands := tags.get(277, 1)) > len(image.getbands()):
             raise ImageError(f"a TIFF of {bands} bands: save the labels as one band")
-        # Behind the last page, and at an opacity of one bit, Pillow raises one of these.
+        # Behind the last page, and at an opacity, Pillow raises one of these.
         with suppress(EOFError, SyntaxError):
             for place in count(1):
                 image.seek(place)
-                if not image.tag_v2.get(254, 0) & _REDUCED_OR_OPACITY:
+                if not image.tag_v2.get(254, 0) & _REDUCED:
                     problem = "a TIFF of several images: save each label in a file of its own"
                     raise ImageError(problem)
 
