@@ -152,6 +152,7 @@ def test_the_folder_of_labels_alone_is_taken_for_the_picks_whose_labels_it_holds
     assert found["estimate"] == summary["estimate"]
 
 
+@pytest.mark.sweep
 def test_stamps_that_a_program_has_rounded_are_found_nevertheless(work, truths, labelled):
     """JavaScript and jq 1.6 keep numbers as floats of 64 bits."""
     _, summary, _ = labelled

@@ -121,6 +121,7 @@ def test_indexes_samples_and_frames_are_asked_for_several_at_once(server, tmp_pa
     assert all(2 < count <= remote.AT_ONCE + 1 for count in most.values()), most
 
 
+@pytest.mark.sweep
 def test_what_reads_much_asks_for_several_parts_at_once(server, tmp_path):
     path = long_log(tmp_path / "drive.mcap", enable_crcs=False, enable_data_crcs=True)
     server.latency = 0.1
@@ -136,6 +137,7 @@ def test_what_reads_much_asks_for_several_parts_at_once(server, tmp_path):
     assert server.sent < 1.1 * path.stat().st_size
 
 
+@pytest.mark.sweep
 def test_labels_behind_all_images_are_read_ahead_beside_them(server, tmp_path):
     path = long_log(tmp_path / "drive.mcap", labels_last=True, chunk_size=CHUNK // 3)
     _, far = tables(server.url("drive.mcap"), tmp_path / "far")

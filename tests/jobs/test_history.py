@@ -276,6 +276,7 @@ def test_a_baseline_without_results_is_told_in_a_line(nights, tmp_path):
     assert (failure.value.where, failure.value.problem) == (str(tmp_path), "holds no results")
 
 
+@pytest.mark.sweep
 def test_places_are_listed_once(nights, monkeypatch):
     walked = []
     monkeypatch.setattr("os.walk", lambda path, walk=os.walk: walked.append(path) or walk(path))

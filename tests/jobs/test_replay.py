@@ -110,6 +110,7 @@ SPARE = sorted({*TABLES} - {"frames", "windows"})
 """Tables that results can do without."""
 
 
+@pytest.mark.sweep
 def test_tables_that_are_left_out_cost_a_report_their_parts_alone(drive, once, tmp_path):
     folder, _ = once
     run(drive, tmp_path, disturb=["noise:1", "fog:2"], output={"without": SPARE, "packed": True})
